@@ -1,0 +1,3 @@
+#include "lattice/control_lattice.h"
+
+namespace sinew::lattice {}
