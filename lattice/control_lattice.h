@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -102,6 +103,13 @@ struct ControlLattice {
   double edge_length = 0.0;  ///< target edge h [m].
   int retries = 0;           ///< how many attempts the gate refused.
 };
+
+/// Edges of a cell as pairs of corners; 6, 9 or 12 of them.
+std::span<const std::array<int, 2>> cell_edges(CellType type);
+
+/// Faces of a cell as corners, counter-clockwise seen from outside a cell of positive volume; the fourth corner of
+/// a triangle is -1. 4, 5 or 6 of them.
+std::span<const std::array<int, 4>> cell_faces(CellType type);
 
 /// Signed volume of a cell [m^3]: positive for VTK's orientation. Hexahedra and wedges by splitting into
 /// tetrahedra about the vertex mean, exact for plane faces.
