@@ -1,10 +1,9 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <Eigen/Geometry>
 
 #include "skeleton/skeleton.h"
 
@@ -16,16 +15,16 @@ enum class Interpolation { Step, Linear, CubicSpline };
 /// Keys of one vector quantity. Before the first key and after the last the value is held.
 struct VectorTrack {
   Interpolation interpolation = Interpolation::Linear;
-  std::vector<double> times;            ///< [s], strictly increasing, at least one.
-  std::vector<Eigen::Vector3d> values;  ///< one per key.
+  std::vector<double> times;                               ///< [s], strictly increasing, at least one.
+  std::vector<Eigen::Vector3d> values;                     ///< one per key.
   std::vector<Eigen::Vector3d> in_tangents, out_tangents;  ///< CubicSpline only, one per key [unit/s].
 };
 
 /// Keys of a rotation: slerp between keys (shorter way), or glTF's cubic spline, normalised.
 struct RotationTrack {
   Interpolation interpolation = Interpolation::Linear;
-  std::vector<double> times;               ///< [s], strictly increasing, at least one.
-  std::vector<Eigen::Quaterniond> values;  ///< unit; neighbours in one hemisphere.
+  std::vector<double> times;                               ///< [s], strictly increasing, at least one.
+  std::vector<Eigen::Quaterniond> values;                  ///< unit; neighbours in one hemisphere.
   std::vector<Eigen::Vector4d> in_tangents, out_tangents;  ///< CubicSpline only (x, y, z, w) [1/s].
 };
 
@@ -34,15 +33,15 @@ struct Channel {
   int joint = -1;
   std::optional<VectorTrack> translation;  ///< [m].
   std::optional<RotationTrack> rotation;
-  std::optional<VectorTrack> scale;        ///< [-].
+  std::optional<VectorTrack> scale;  ///< [-].
 };
 
 /// A named motion of a skeleton.
 struct Clip {
   std::string name;
-  double start = 0.0;  ///< earliest key [s].
-  double end = 0.0;    ///< latest key [s].
-  int num_keys = 0;    ///< distinct key times over all channels.
+  double start = 0.0;             ///< earliest key [s].
+  double end = 0.0;               ///< latest key [s].
+  int num_keys = 0;               ///< distinct key times over all channels.
   std::vector<Channel> channels;  ///< at most one per joint.
 
   double duration() const { return end - start; }

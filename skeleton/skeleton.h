@@ -1,18 +1,17 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <string>
 #include <vector>
-
-#include <Eigen/Geometry>
 
 /// Joints, poses and clips: plain values, no files, no lattice.
 namespace sinew::skeleton {
 
 /// A local transform in parts: x_parent = translation + rotation * (scale .* x).
 struct LocalTransform {
-  Eigen::Vector3d translation{0, 0, 0};                             ///< [m].
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();     ///< unit.
-  Eigen::Vector3d scale{1, 1, 1};                                   ///< [-]; may be negative, not zero.
+  Eigen::Vector3d translation{0, 0, 0};                          ///< [m].
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< unit.
+  Eigen::Vector3d scale{1, 1, 1};                                ///< [-]; may be negative, not zero.
 
   /// parent_from_joint.
   Eigen::Affine3d matrix() const;
@@ -27,8 +26,8 @@ struct Joint {
   Eigen::Affine3d parent_from_joint = Eigen::Affine3d::Identity();
   /// The same in parts, for channels that animate only some of them.
   LocalTransform local;
-  /// world_from_joint in the rest pose, that is the pose the skin was bound in; not necessarily the pose of the
-  /// node tree. Invertible.
+  /// world_from_joint in the rest pose, that is the pose the skin was bound in; not necessarily the pose of
+  /// the node tree. Invertible.
   Eigen::Affine3d rest_from_joint = Eigen::Affine3d::Identity();
 };
 
@@ -61,7 +60,8 @@ Pose pose_from_local(const Skeleton& skeleton, const std::vector<Eigen::Affine3d
 /// The pose of the node tree, where nothing is animated.
 Pose node_pose(const Skeleton& skeleton);
 
-/// T_J for every joint: world_from_joint * joint_from_rest, the affine map that carries rest points to the pose.
+/// T_J for every joint: world_from_joint * joint_from_rest, the affine map that carries rest points to the
+/// pose.
 std::vector<Eigen::Affine3d> pose_from_rest(const Skeleton& skeleton, const Pose& pose);
 
 }  // namespace sinew::skeleton
