@@ -5,7 +5,8 @@
 
 namespace sinew::assets {
 
-/// A file is wrong (exit code 3). One line: "<file>: <thing>: <what>, got <value>, expected <range>; hint: <remedy>".
+/// A file is wrong (exit code 3). One line: "<file>: <thing>: <what>, got <value>, expected <range>; hint:
+/// <remedy>".
 class InputError : public std::runtime_error {
  public:
   /// `file` as the user gave it; `message` names the thing in it, what is wrong and the remedy.

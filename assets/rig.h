@@ -49,13 +49,14 @@ struct Rig {
   std::vector<Part> parts;
   skeleton::Skeleton skeleton;
   std::vector<skeleton::Clip> clips;
-  double metres_per_unit = 1.0;       ///< file units were multiplied by this.
-  UpAxis up_axis = UpAxis::Y;         ///< of the file.
-  /// rig_from_file: file world coordinates (units, axes) to the rig's; a similarity. Outputs in file space use
-  /// its inverse.
+  double metres_per_unit = 1.0;  ///< file units were multiplied by this.
+  UpAxis up_axis = UpAxis::Y;    ///< of the file.
+  /// rig_from_file: file world coordinates (units, axes) to the rig's; a similarity. Outputs in file space
+  /// use its inverse.
   Eigen::Affine3d rig_from_file = Eigen::Affine3d::Identity();
-  double height = 0.0;                ///< extent along Y of the simulated parts at rest [m].
-  /// True where the importer keeps the file's own vertex order (glTF); false where the order is the importer's.
+  double height = 0.0;  ///< extent along Y of the simulated parts at rest [m].
+  /// True where the importer keeps the file's own vertex order (glTF); false where the order is the
+  /// importer's.
   bool file_vertex_order = false;
   std::vector<Finding> findings;
 };
@@ -63,8 +64,8 @@ struct Rig {
 /// Total vertex count over all parts: the order of every exported frame is part by part.
 int num_vertices(const Rig& rig);
 
-/// Linear blend skinning of every part with T_J = pose_from_rest, num_vertices(rig) x 3 [m]: the plain skinning
-/// that the simulation is compared with, and the motion of parts that are not simulated.
+/// Linear blend skinning of every part with T_J = pose_from_rest, num_vertices(rig) x 3 [m]: the plain
+/// skinning that the simulation is compared with, and the motion of parts that are not simulated.
 lattice::Points skin(const Rig& rig, const std::vector<Eigen::Affine3d>& pose_from_rest);
 
 /// The simulated parts welded into one surface for physics.

@@ -1,9 +1,10 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "skeleton/skeleton.h"
 

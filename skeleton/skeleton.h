@@ -1,8 +1,9 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <string>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 /// Joints, poses and clips: plain values, no files, no lattice.
 namespace sinew::skeleton {

@@ -1,11 +1,12 @@
 #include "skeleton/clip.h"
 
 #include <cmath>
-#include <gtest/gtest.h>
 #include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
+
+#include <gtest/gtest.h>
 
 namespace sinew::skeleton {
 namespace {

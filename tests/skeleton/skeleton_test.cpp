@@ -1,12 +1,13 @@
 #include "skeleton/skeleton.h"
 
 #include <cmath>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 namespace sinew::skeleton {
 namespace {
@@ -78,7 +79,8 @@ TEST(ForwardKinematics, EqualsTheProductAlongThePathToTheRoot) {
   const auto uniform = [&rng] { return static_cast<double>(rng() >> 11) * 0x1.0p-53 * 2.0 - 1.0; };
   std::vector<Joint> joints;
   for (int i = 0; i < 40; ++i) {
-    Joint j = joint("j" + std::to_string(i), i == 0 ? -1 : static_cast<int>(rng() % static_cast<unsigned>(i)),
+    Joint j = joint(std::string("j").append(std::to_string(i)),
+                    i == 0 ? -1 : static_cast<int>(rng() % static_cast<unsigned>(i)),
                     {uniform(), uniform(), uniform()});
     j.local.rotation = Eigen::Quaterniond(uniform(), uniform(), uniform(), uniform()).normalized();
     j.local.scale << 1.5, 0.75, -1.25;
