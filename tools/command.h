@@ -11,8 +11,9 @@ struct CommandContext {
   int exit_code = 0;  ///< of the subcommand that ran (DESIGN section 10).
 };
 
-// Each adds one subcommand to `app`; its callback does the work, prints data to stdout and talk to stderr, sets
-// `context.exit_code` or throws one of the errors of assets/error.h (main maps them to exit codes and one line).
+// Each adds one subcommand to `app`; its callback does the work, prints data to stdout and talk to stderr,
+// sets `context.exit_code` or throws one of the errors of assets/error.h (main maps them to exit codes and
+// one line).
 void add_inspect_command(CLI::App& app, CommandContext& context);
 void add_lattice_command(CLI::App& app, CommandContext& context);
 void add_simulate_command(CLI::App& app, CommandContext& context);

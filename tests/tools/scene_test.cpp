@@ -1,0 +1,351 @@
+#include "tools/scene.h"
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "assets/error.h"
+#include "tools/scene_fields.h"
+
+namespace sinew::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A directory of its own per test, made the current one, so that paths in messages are short and the same
+/// anywhere.
+class SceneFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    before_ = fs::current_path();
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    directory_ = fs::path(SINEW_BINARY_DIR) / "scene_test" / info->name();
+    fs::remove_all(directory_);
+    fs::create_directories(directory_);
+    fs::current_path(directory_);
+  }
+  void TearDown() override { fs::current_path(before_); }
+
+  static Scene read(const std::string& text, const std::string& file = "scene.toml") {
+    std::ofstream(file, std::ios::binary) << text;
+    return read_scene(file);
+  }
+
+  static std::string refusal(const std::string& text) {
+    try {
+      read(text);
+    } catch (const assets::ConfigError& e) {
+      return e.what();
+    }
+    return "accepted";
+  }
+
+ private:
+  fs::path before_, directory_;
+};
+
+TEST_F(SceneFile, KeepsTheDefaultsOfKeysLeftOut) { EXPECT_EQ(read(""), Scene{}); }
+
+TEST_F(SceneFile, SetsEveryKey) {
+  const Scene scene = read(R"(
+rig = "hero.glb"
+output = "out/hero"
+overwrite = true
+json = true
+clip = "walk"
+lattice = "hero.vtu"
+cells = 500
+levels = 2
+young = 20000
+poisson = 0.49
+density = 950.5
+damping = 0.05
+damping_frequency = 4
+height = 1.8
+output_space = "si"
+gravity = [0, 0, -9.81]
+step = "1/240"
+integrator = "backward-euler"
+fps = 23.976
+frames = "3-47"
+settle = 0
+threads = 2
+output_mesh = "hero.obj"
+
+[[material]]
+bones = ["tail*", "ear_?"]
+young = 5000.0
+
+[[material]]
+bones = ["belly"]
+poisson = 0.3
+density = 900
+)");
+  Scene expected;
+  expected.rig = "hero.glb";
+  expected.output = "out/hero";
+  expected.overwrite = true;
+  expected.json = true;
+  expected.clip = "walk";
+  expected.lattice = "hero.vtu";
+  expected.cells = 500;
+  expected.levels = 2;
+  expected.young = 20000.0;
+  expected.poisson = 0.49;
+  expected.density = 950.5;
+  expected.damping = 0.05;
+  expected.damping_frequency = 4.0;
+  expected.height = 1.8;
+  expected.output_space = OutputSpace::Si;
+  expected.gravity = {0.0, 0.0, -9.81};
+  expected.step = 1.0 / 240.0;
+  expected.integrator = Integrator::BackwardEuler;
+  expected.fps = 23.976;
+  expected.frames = FrameRange{3, 47};
+  expected.settle = 0.0;
+  expected.threads = 2;
+  expected.output_mesh = "hero.obj";
+  expected.materials = {{{"tail*", "ear_?"}, 5000.0, {}, {}}, {{"belly"}, {}, 0.3, 900.0}};
+  EXPECT_EQ(scene, expected);
+}
+
+TEST_F(SceneFile, TakesPathsRelativeToItself) {
+  fs::create_directory("scenes");
+  const Scene scene =
+      read("rig = \"hero.glb\"\nlattice = \"/cages/hero.vtu\"\nclip = \"a/b\"\n", "scenes/hero.toml");
+  EXPECT_EQ(scene.rig, "scenes/hero.glb");
+  EXPECT_EQ(scene.lattice, "/cages/hero.vtu");
+  EXPECT_EQ(scene.clip, "a/b");  // a name, not a path
+}
+
+TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
+  struct Case {
+    const char* text;
+    const char* message;
+  };
+  const Case cases[] = {
+      {"poisson = 0.5", "scene.toml:1: poisson: got 0.5, expected -1 < nu < 0.5; hint: 0.49"},
+      {"\n\npoisson = -1.0", "scene.toml:3: poisson: got -1, expected -1 < nu < 0.5; hint: 0.49"},
+      {"poisson = nan", "scene.toml:1: poisson: got nan, expected -1 < nu < 0.5; hint: 0.49"},
+      {"young = 0",
+       "scene.toml:1: young: got 0, expected 0.001 <= E <= 1e+12 Pa; hint: leave it out for the "
+       "automatic "
+       "value"},
+      {"young = \"10 kPa\"",
+       "scene.toml:1: young: got the string '10 kPa', expected a number, 0.001 <= E <= 1e+12 Pa; "
+       "hint: no "
+       "quotes and no unit"},
+      {"density = 0", "scene.toml:1: density: got 0, expected 1 <= rho <= 100000 kg/m^3; hint: 1000"},
+      {"damping = -0.1", "scene.toml:1: damping: got -0.1, expected 0 <= zeta <= 10; hint: 0.1"},
+      {"step = 1e9", "scene.toml:1: step: got 1000000000, expected 1e-06 <= h <= 0.1 s; hint: 1/120"},
+      {"step = \"1/0\"",
+       "scene.toml:1: step: got '1/0', expected a number or a fraction of two, 1e-06 <= h <= 0.1 s"},
+      {"gravity = [0, inf, 0]",
+       "scene.toml:1: gravity: got inf, expected -10000 <= each component <= 10000 m/s^2; hint: 0,-9.81,0"},
+      {"gravity = [0, -9.81]", "scene.toml:1: gravity: got an array, expected an array of three numbers"},
+      {"fps = true", "scene.toml:1: fps: got a boolean, expected a number, 0.1 <= fps <= 10000 1/s"},
+      {"levels = 4", "scene.toml:1: levels: got 4, expected 0 <= levels <= 3; hint: 1"},
+      {"levels = 1.0", "scene.toml:1: levels: got a number, expected a whole number, 0 <= levels <= 3"},
+      {"threads = -1", "scene.toml:1: threads: got -1, expected 0 <= threads <= 1024; hint: 0"},
+      {"frames = \"5-2\"",
+       "scene.toml:1: frames: got 5-2, expected A-B with 0 <= A <= B <= 10000000; hint: 0-47"},
+      {"frames = \"first\"",
+       "scene.toml:1: frames: got 'first', expected A-B, two frame numbers; hint: 0-47"},
+      {"integrator = \"bdf3\"",
+       "scene.toml:1: integrator: got 'bdf3', expected bdf2 or backward-euler; hint: bdf2"},
+      {"clip = 3", "scene.toml:1: clip: got a whole number, expected a string"},
+      {"overwrite = 1", "scene.toml:1: overwrite: got a whole number, expected true or false"},
+      {"rig = \"a.glb\"\ndampnig = 0.1", "scene.toml:2: dampnig: unknown key; hint: did you mean damping?"},
+      {"[material]\nbones = [\"a\"]", "scene.toml:1: material: got a table, expected tables, [[material]]"},
+      {"[[material]]\nyuong = 3\nbones = [\"a\"]",
+       "scene.toml:2: yuong: unknown key; hint: did you mean young?"},
+      {"[[material]]\nyoung = 3.0",
+       "scene.toml:1: material 1: no bones, expected at least one name or pattern; hint: bones = "
+       "[\"tail*\"]"},
+      {"[[material]]\nbones = [\"a\"]\n\npoisson = 0.7",
+       "scene.toml:4: material poisson: got 0.7, expected -1 < nu < 0.5; hint: 0.49"},
+      {"[[material]]\nbones = \"a\"",
+       "scene.toml:2: material bones: got a string, expected an array of strings"},
+  };
+  for (const auto& [text, message] : cases) EXPECT_EQ(refusal(text), message) << "scene: " << text;
+}
+
+TEST_F(SceneFile, ListsTheKnownKeysWhereNoneIsNear) {
+  const std::string message = refusal("temperature = 3");
+  EXPECT_EQ(message.rfind("scene.toml:1: temperature: unknown key; hint: known are cells, clip, damping,", 0),
+            0u)
+      << message;
+}
+
+TEST_F(SceneFile, ReportsTheFirstWrongLineAndNotTheFirstWrongKey) {
+  EXPECT_EQ(refusal("young = -1\ndamping = -1\n").rfind("scene.toml:1: young", 0), 0u);
+}
+
+TEST_F(SceneFile, RefusesDuplicateKeysAndBrokenTomlWithLineAndColumn) {
+  EXPECT_EQ(refusal("cells = 30\ncells = 40\n").rfind("scene.toml:2:", 0), 0u)
+      << refusal("cells = 30\ncells = 40\n");
+  EXPECT_EQ(refusal("cells = 9223372036854775807000\n").rfind("scene.toml:1:", 0), 0u);
+  EXPECT_EQ(refusal("cells = = 3\n").rfind("scene.toml:1:", 0), 0u);
+  EXPECT_EQ(refusal("cells = 1,5\n").rfind("scene.toml:1:", 0), 0u);
+  EXPECT_EQ(refusal("a = " + std::string(100000, '[')).rfind("scene.toml:1:", 0), 0u);
+}
+
+TEST_F(SceneFile, ReportsFilesThatCannotBeRead) {
+  try {
+    read_scene("missing.toml");
+    FAIL() << "accepted";
+  } catch (const assets::IoError& e) {
+    EXPECT_EQ(std::string(e.what()),
+              "missing.toml: not found (" + (fs::current_path() / "missing.toml").string() + ")");
+  }
+  fs::create_directory("folder.toml");
+  try {
+    read_scene("folder.toml");
+    FAIL() << "accepted";
+  } catch (const assets::IoError& e) {
+    EXPECT_STREQ(e.what(), "folder.toml: not a regular file");
+  }
+  EXPECT_THROW(read_scene("/dev/zero"), assets::IoError);
+  EXPECT_EQ(refusal(std::string((1 << 20) + 1, '#')),
+            "scene.toml: longer than 1048576 bytes, expected a scene in TOML");
+}
+
+TEST_F(SceneFile, StopsAtTheLimitOfCells) {
+  try {
+    read("cells = 100000000");
+    FAIL() << "accepted";
+  } catch (const assets::LimitError& e) {
+    EXPECT_STREQ(e.what(),
+                 "scene.toml:1: cells: got 100000000, the limit is 1000000 cells; that many would need at "
+                 "least 300 GB "
+                 "of memory; hint: 1000 cells suffice for most characters");
+  }
+}
+
+/// Any scene within the ranges; digits come from the generator's own bits, as the standard distributions
+/// differ between libraries.
+Scene random_scene(std::mt19937_64& rng) {
+  const auto unit = [&] { return static_cast<double>(rng() >> 11) * 0x1.0p-53; };
+  const auto index = [&](int n) { return static_cast<int>(rng() % static_cast<std::uint64_t>(n)); };
+  const auto text = [&] {
+    const char* const letters[] = {"a", "Z", "\"", "\\", " ",    "\n", "\t",
+                                   "#", "'", "é",  "骨", "\x7F", "*",  "="};
+    std::string result = "n";
+    for (int i = index(8); i > 0; --i) result += letters[index(14)];
+    return result;
+  };
+  Scene scene;
+  scene.rig = text();
+  scene.output = text();
+  scene.overwrite = index(2) == 1;
+  scene.json = index(2) == 1;
+  if (index(2) == 1) scene.clip = text();
+  if (index(2) == 1) scene.lattice = text();
+  scene.cells = 20 + index(1000);
+  scene.levels = index(4);
+  if (index(2) == 1) scene.young = 1.0 + 1e5 * unit();
+  scene.poisson = -0.9 + 1.39 * unit();
+  scene.density = 1.0 + 2000.0 * unit();
+  scene.damping = 10.0 * unit();
+  scene.damping_frequency = 1.0 + 10.0 * unit();
+  if (index(2) == 1) scene.height = 0.1 + unit();
+  scene.output_space = index(2) == 1 ? OutputSpace::Si : OutputSpace::File;
+  scene.gravity = {unit(), -10.0 * unit(), 1e-7 * unit()};
+  scene.step = 1e-6 + 0.09 * unit();
+  scene.integrator = index(2) == 1 ? Integrator::BackwardEuler : Integrator::Bdf2;
+  scene.fps = 1.0 + 100.0 * unit();
+  if (index(2) == 1) scene.frames = FrameRange{index(10), 10 + index(10)};
+  scene.settle = 10.0 * unit();
+  scene.threads = index(64);
+  if (index(2) == 1) scene.output_mesh = text();
+  for (int i = index(3); i > 0; --i) {
+    scene.materials.push_back({{text(), text()}, 1.0 + unit(), std::nullopt, 500.0 * (1.0 + unit())});
+  }
+  return scene;
+}
+
+TEST_F(SceneFile, ReadsBackExactlyWhatIsPrinted) {
+  std::mt19937_64 rng(20021);
+  for (int i = 0; i < 200; ++i) {
+    const Scene scene = random_scene(rng);
+    scene.validate();
+    const std::string text = print_scene(scene);
+    EXPECT_EQ(read(text), scene) << text;
+  }
+  EXPECT_EQ(read(print_scene(Scene{})), Scene{});
+}
+
+TEST_F(SceneFile, PrintsEveryKey) {
+  const std::string text = print_scene(Scene{});
+  for (const SceneField& field : scene_fields()) {
+    EXPECT_NE(text.find(std::string(field.key) + " ="), std::string::npos) << field.key;
+  }
+  EXPECT_NE(text.find("# Poisson's ratio; -1 < nu < 0.5\npoisson = 0.45\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("integrator = \"bdf2\"\n"), std::string::npos) << text;
+}
+
+TEST_F(SceneFile, CannotPrintANameThatIsNotUtf8) {
+  Scene scene;
+  scene.rig = "hero\xFF.glb";
+  try {
+    print_scene(scene);
+    FAIL() << "printed";
+  } catch (const assets::ConfigError& e) {
+    EXPECT_STREQ(
+        e.what(),
+        "rig: got 'hero\\xff.glb', expected UTF-8; hint: rename the file, TOML cannot hold the name");
+  }
+}
+
+TEST(SceneValues, AreCheckedWhereverTheyComeFrom) {
+  const auto refusal = [](const std::function<void(Scene&)>& change) -> std::string {
+    Scene scene;
+    change(scene);
+    try {
+      scene.validate();
+    } catch (const assets::ConfigError& e) {
+      return e.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(refusal([](Scene&) {}), "accepted");
+  EXPECT_EQ(refusal([](Scene& s) { s.poisson = 0.5; }),
+            "poisson: got 0.5, expected -1 < nu < 0.5; hint: 0.49");
+  EXPECT_EQ(refusal([](Scene& s) { s.poisson = 0.4999; }), "accepted");
+  EXPECT_EQ(refusal([](Scene& s) {
+              s.materials = {{{"a"}, {}, 0.5, {}}};
+            }),
+            "material 1: poisson: got 0.5, expected -1 < nu < 0.5; hint: 0.49");
+  EXPECT_EQ(refusal([](Scene& s) {
+              s.materials = {{{}, 3.0, {}, {}}};
+            }),
+            "material 1: no bones, expected at least one name");
+}
+
+TEST(SceneMaterials, FindTheBonesByPatternAndTheLaterOneWins) {
+  Scene scene;
+  scene.materials = {{{"*"}, 1.0, {}, {}}, {{"tail_?", "ear*l"}, 2.0, {}, {}}, {{"tail_2"}, 3.0, {}, {}}};
+  EXPECT_EQ(
+      material_of_bone(scene, "r.glb", {"tail_1", "tail_2", "tail_10", "ear_tip_l", "ear_tip_r", "earl"}),
+      (std::vector<int>{1, 2, 0, 1, 0, 1}));
+  scene.materials = {{{"tail_2"}, 3.0, {}, {}}};
+  EXPECT_EQ(material_of_bone(scene, "r.glb", {"tail_1", "tail_2"}), (std::vector<int>{-1, 0}));
+}
+
+TEST(SceneMaterials, RefuseAPatternThatFitsNoBone) {
+  Scene scene;
+  scene.materials = {{{"hip"}, 1.0, {}, {}}, {{"tial*"}, 2.0, {}, {}}};
+  try {
+    material_of_bone(scene, "r.glb", {"hip", "tail"});
+    FAIL() << "accepted";
+  } catch (const assets::InputError& e) {
+    EXPECT_STREQ(e.what(), "r.glb: material 2: no bone is named 'tial*', expected one of hip, tail");
+  }
+}
+
+}  // namespace
+}  // namespace sinew::tools

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+/// Stopping on request: SIGINT and SIGTERM set a flag that long work polls.
+namespace sinew::tools {
+
+/// From now on the first SIGINT or SIGTERM only sets the flag; the second of its kind ends the process at
+/// once (its default action), as a user who insists expects. SIGPIPE and SIGXFSZ are ignored: a write that
+/// fails says so.
+void install_interrupt_handlers();
+
+/// The signal that asked to stop, or 0. Cheap; for any thread.
+int interrupt_signal();
+
+/// Throws Interrupted with "stopped by SIGINT <where>" when a signal came; to be called between steps.
+void stop_if_interrupted(const std::string& where);
+
+}  // namespace sinew::tools

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+/// What one run of `sinew simulate` is asked to do: every flag of the command and every key of a scene file.
+namespace sinew::tools {
+
+enum class Integrator { Bdf2, BackwardEuler };
+
+/// Units and axes of what is written: the input file's own, or metres with Y up.
+enum class OutputSpace { File, Si };
+
+/// Output frames first ... last, both included; frame k shows the clip at t0 + k / fps.
+struct FrameRange {
+  int first = 0;  ///< >= 0.
+  int last = 0;   ///< >= first.
+
+  friend bool operator==(const FrameRange&, const FrameRange&) = default;
+};
+
+/// Flesh that differs from the scene's: `[[material]]` in a scene file. Fields left out are the scene's.
+struct BoneMaterial {
+  /// Names of bones, with * for any letters and ? for one; at least one.
+  std::vector<std::string> bones;
+  std::optional<double> young;    ///< as Scene::young.
+  std::optional<double> poisson;  ///< as Scene::poisson.
+  std::optional<double> density;  ///< as Scene::density.
+
+  friend bool operator==(const BoneMaterial&, const BoneMaterial&) = default;
+};
+
+/// Built whole by read_scene or SimulateOptions, checked once by validate, then read only. Paths are relative
+/// to the current directory. Limits follow the range in which the method is tested.
+struct Scene {
+  /// The character; required for a run.
+  std::string rig;
+  /// Where the results go; required for a run.
+  std::string output;
+  /// Replace a run that `output` holds already.
+  bool overwrite = false;
+  /// Report as JSON on stdout.
+  bool json = false;
+
+  /// Name of the clip; empty: the first with at least two keys.
+  std::string clip;
+  /// Lattice file; empty: a lattice is built.
+  std::string lattice;
+  /// Wanted number of lattice cells [-]; 20 ... 1e6.
+  int cells = 1000;
+  /// Finest active level of the hierarchy [-]; 0 ... 3. 1, as tetrahedra of level 0 alone are far too stiff.
+  int levels = 1;
+
+  /// Young's modulus [Pa]; 1e-3 ... 1e12. Unset: chosen so that the flesh swings at about 8 Hz.
+  std::optional<double> young;
+  /// Poisson's ratio [-]; in (-1, 0.5). Soft tissue hardly changes its volume.
+  double poisson = 0.45;
+  /// Density [kg/m^3]; 1 ... 1e5. Soft tissue is about water.
+  double density = 1000.0;
+  /// Damping ratio at `damping_frequency` [-]; 0 ... 10.
+  double damping = 0.1;
+  /// Frequency at which `damping` holds [Hz]; 0.01 ... 1000.
+  double damping_frequency = 3.0;
+  /// Materials of single bones; a later one overrides an earlier one.
+  std::vector<BoneMaterial> materials;
+
+  /// Height of the character [m]; 1e-3 ... 1e4. Unset: the units of the file are guessed.
+  std::optional<double> height;
+  OutputSpace output_space = OutputSpace::File;
+  /// Gravity in the rig's space, Y up [m/s^2]; each component within 1e4.
+  Eigen::Vector3d gravity{0.0, -9.81, 0.0};
+  /// Time step [s]; 1e-6 ... 0.1. Belongs to the scene, not to the frame rate: the held pose depends on it
+  /// slightly.
+  double step = 1.0 / 120.0;
+  Integrator integrator = Integrator::Bdf2;
+  /// Output frames per second [1/s]; 0.1 ... 1e4. 30, the rate at which most clips for games are keyed: a key
+  /// falls on a frame, and a frame is four default steps.
+  double fps = 30.0;
+  /// Unset: the whole clip.
+  std::optional<FrameRange> frames;
+  /// Longest time that the flesh may take to settle before the first frame [s]; 0 ... 3600.
+  double settle = 5.0;
+  /// Threads; 0 ... 1024, 0 = all. The results do not depend on it.
+  int threads = 0;
+  /// The artist's own mesh (OBJ or PLY), whose vertex order the output takes over; empty: the rig's order.
+  std::string output_mesh;
+
+  /// Throws assets::ConfigError naming the key, its value and the range, assets::LimitError for too many
+  /// cells.
+  void validate() const;
+
+  friend bool operator==(const Scene&, const Scene&) = default;
+};
+
+/// Reads a scene file (TOML). Strict: an unknown key is an error that names the nearest valid one, types are
+/// not converted, values are checked. Keys left out keep the values of Scene. Paths in it are relative to its
+/// own directory. Throws assets::ConfigError "<file>:<line>: ...", assets::IoError where it cannot be read.
+Scene read_scene(const std::string& file);
+
+/// The whole scene as TOML, with units and ranges as comments; read_scene gives the same scene back when the
+/// text lies in the current directory. Throws assets::ConfigError for a path that is not UTF-8: TOML cannot
+/// hold it.
+std::string print_scene(const Scene& scene);
+
+/// For every bone the index of its material in scene.materials, or -1 for the scene's own. Throws
+/// assets::InputError (for `rig_file`) where a pattern fits no bone.
+std::vector<int> material_of_bone(const Scene& scene, const std::string& rig_file,
+                                  const std::vector<std::string>& bone_names);
+
+}  // namespace sinew::tools

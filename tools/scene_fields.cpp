@@ -1,0 +1,307 @@
+#include "tools/scene_fields.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "assets/error.h"
+#include "tools/failure.h"
+#include "tools/suggest.h"
+
+namespace sinew::tools {
+namespace {
+
+using assets::ConfigError;
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+
+constexpr int kMaxFrame = 10'000'000;
+constexpr int kMaxCells = 1'000'000;
+
+// Ranges: where the method is tested, wide enough for an insect and for a whale. A NaN is in no range.
+constexpr auto kFields = std::to_array<SceneField>({
+    {"rig", PathMember{&Scene::rig}, "the character: glTF, GLB, FBX, Collada, ..."},
+    {"output", PathMember{&Scene::output}, "directory that the results go to"},
+    {"overwrite", &Scene::overwrite, "replace the run that the output holds already"},
+    {"json", &Scene::json, "print the report as JSON on standard output"},
+    {"clip", &Scene::clip, "name of the clip; left out: the first with at least two keys"},
+    {"lattice", PathMember{&Scene::lattice}, "lattice file (.vtu, .mesh); left out: one is built"},
+    {"cells", &Scene::cells, "wanted number of lattice cells", "cells", {20, kMaxCells}, "", "1000"},
+    {"levels", &Scene::levels, "finest active level of the hierarchy", "levels", {0, 3}, "", "1"},
+    {"young",
+     &Scene::young,
+     "Young's modulus; left out: flesh that swings at about 8 Hz",
+     "E",
+     {1e-3, 1e12},
+     "Pa",
+     "leave it out for the automatic value"},
+    {"poisson", &Scene::poisson, "Poisson's ratio", "nu", {-1.0, 0.5, true}, "", "0.49"},
+    {"density", &Scene::density, "density", "rho", {1.0, 1e5}, "kg/m^3", "1000"},
+    {"damping", &Scene::damping, "damping ratio at the damping frequency", "zeta", {0.0, 10.0}, "", "0.1"},
+    {"damping_frequency",
+     &Scene::damping_frequency,
+     "frequency at which the damping ratio holds",
+     "f",
+     {0.01, 1000.0},
+     "Hz",
+     "3"},
+    {"height",
+     &Scene::height,
+     "height of the character; left out: the file's units are guessed",
+     "height",
+     {1e-3, 1e4},
+     "m",
+     "1.8"},
+    {"output_space", &Scene::output_space, "units and axes of the output: file (the input's) or si"},
+    {"gravity", &Scene::gravity, "gravity, Y up", "each component", {-1e4, 1e4}, "m/s^2", "0,-9.81,0"},
+    {"step", &Scene::step, "time step", "h", {1e-6, 0.1}, "s", "1/120"},
+    {"integrator", &Scene::integrator, "bdf2 or backward-euler (more damped, cannot fail)"},
+    {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
+    {"frames", &Scene::frames, "output frames A-B, both included; left out: the whole clip"},
+    {"settle",
+     &Scene::settle,
+     "longest time to settle before the first frame",
+     "settle",
+     {0.0, 3600.0},
+     "s",
+     "5"},
+    {"threads",
+     &Scene::threads,
+     "threads, 0 = all; the results do not depend on it",
+     "threads",
+     {0, 1024},
+     "",
+     "0"},
+    {"output_mesh", PathMember{&Scene::output_mesh},
+     "mesh (OBJ, PLY) whose vertex order the output takes over"},
+});
+
+const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
+const std::vector<std::string> kOutputSpaceNames{"file", "si"};             // in the enum's order
+
+/// A finite or infinite number, all of the text; nullopt for anything else, overflow included.
+std::optional<double> parse_double(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::optional<int> parse_int(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
+  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
+  return text;
+}
+
+[[noreturn]] void refuse(const SceneField& field, std::string_view value, std::string_view expected,
+                         const std::string& where) {
+  throw ConfigError(fmt::format("{}: got {}, expected {}{}", where, value, expected,
+                                field.hint.empty() ? "" : fmt::format("; hint: {}", field.hint)));
+}
+
+std::string quoted(std::string_view text) { return fmt::format("'{}'", text); }
+
+void check_cells(double value, const std::string& where) {
+  if (value <= kMaxCells) return;
+  // 3 kB: a tetrahedron's matrices and its share of the factor at level 0, the least that a run can need.
+  throw assets::LimitError(
+      fmt::format("{}: got {:.0f}, the limit is {} cells; that many would need at least {:.0f} GB "
+                  "of memory; hint: 1000 cells suffice for most characters",
+                  where, value, kMaxCells, std::ceil(value * 3e3 / 1e9)));
+}
+
+template <class Enum>
+Enum parse_choice(const std::vector<std::string>& names, std::string_view text, const std::string& where) {
+  const auto found = std::find(names.begin(), names.end(), text);
+  if (found != names.end()) return static_cast<Enum>(found - names.begin());
+  const std::string guess = nearest(text, names);
+  throw ConfigError(fmt::format("{}: got '{}', expected {}; hint: {}", where, text, fmt::join(names, " or "),
+                                guess.empty() ? names.front() : guess));
+}
+
+FrameRange parse_frames(std::string_view text, const std::string& where) {
+  const auto dash = text.find('-', 1);  // not at 0: that would be a sign
+  const auto first = parse_int(trimmed(text.substr(0, dash)));
+  const auto last = dash == std::string_view::npos ? first : parse_int(trimmed(text.substr(dash + 1)));
+  if (!first || !last) {
+    throw ConfigError(fmt::format("{}: got '{}', expected A-B, two frame numbers; hint: 0-47", where, text));
+  }
+  return {*first, *last};
+}
+
+Eigen::Vector3d parse_vector(const SceneField& field, std::string_view text, const std::string& where) {
+  const std::string whole(text);
+  Eigen::Vector3d vector;
+  for (int i = 0; i < 3; ++i) {
+    const auto comma = text.find(',');
+    const bool last = i == 2;
+    const auto value = parse_number(trimmed(text.substr(0, comma)));
+    if (!value || last != (comma == std::string_view::npos)) {
+      refuse(field, quoted(whole), "three numbers x,y,z", where);
+    }
+    vector[i] = *value;
+    text.remove_prefix(last ? text.size() : comma + 1);
+  }
+  return vector;
+}
+
+std::string toml_string(const SceneField& field, const std::string& text) {
+  if (!is_utf8(text)) {
+    throw ConfigError(
+        fmt::format("{}: got '{}', expected UTF-8; hint: rename the file, TOML cannot hold the name",
+                    field.key, single_line(text)));
+  }
+  std::string literal = "\"";
+  for (const char letter : text) {
+    const auto byte = static_cast<unsigned char>(letter);
+    if (letter == '"' || letter == '\\') literal += '\\';
+    if (byte < 0x20 || byte == 0x7F) {
+      literal += fmt::format("\\u{:04X}", byte);
+    } else {
+      literal += letter;
+    }
+  }
+  return literal + '"';
+}
+
+}  // namespace
+
+std::optional<double> parse_number(std::string_view text) {
+  const auto slash = text.find('/');
+  if (slash == std::string_view::npos) return parse_double(text);
+  const auto numerator = parse_double(text.substr(0, slash));
+  const auto denominator = parse_double(text.substr(slash + 1));
+  if (!numerator || !denominator || *denominator == 0.0) return std::nullopt;
+  return *numerator / *denominator;
+}
+
+std::span<const SceneField> scene_fields() { return kFields; }
+
+const SceneField* find_scene_field(std::string_view key) {
+  const auto found =
+      std::find_if(kFields.begin(), kFields.end(), [&](const auto& field) { return field.key == key; });
+  return found == kFields.end() ? nullptr : &*found;
+}
+
+std::string flag_name(const SceneField& field) {
+  std::string name = "--" + std::string(field.key);
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
+std::string range_text(const SceneField& field) {
+  // Long rows of zeros are hard to count.
+  const auto text = [](double limit) {
+    return limit > 1e7 ? fmt::format("{:g}", limit) : fmt::format("{}", limit);
+  };
+  const char* sign = field.range.open ? "<" : "<=";
+  return fmt::format("{0} {1} {2} {1} {3}{4}{5}", text(field.range.min), sign, field.symbol,
+                     text(field.range.max), field.unit.empty() ? "" : " ", field.unit);
+}
+
+void check_number(const SceneField& field, double value, const std::string& where) {
+  if (field.key == "cells") check_cells(value, where);
+  if (!field.range.contains(value)) refuse(field, fmt::format("{}", value), range_text(field), where);
+}
+
+void check_field(const Scene& scene, const SceneField& field, const std::string& where) {
+  std::visit(
+      Overloaded{
+          [](bool Scene::*) {},
+          [](std::string Scene::*) {},
+          [](PathMember) {},
+          [](Integrator Scene::*) {},
+          [](OutputSpace Scene::*) {},
+          [&](int Scene::*member) { check_number(field, scene.*member, where); },
+          [&](double Scene::*member) { check_number(field, scene.*member, where); },
+          [&](std::optional<double> Scene::*member) {
+            if (scene.*member) check_number(field, *(scene.*member), where);
+          },
+          [&](Eigen::Vector3d Scene::*member) {
+            for (const double component : scene.*member) check_number(field, component, where);
+          },
+          [&](std::optional<FrameRange> Scene::*member) {
+            if (!(scene.*member)) return;
+            const auto [first, last] = *(scene.*member);
+            if (first >= 0 && first <= last && last <= kMaxFrame) return;
+            throw ConfigError(fmt::format("{}: got {}-{}, expected A-B with 0 <= A <= B <= {}; hint: 0-47",
+                                          where, first, last, kMaxFrame));
+          },
+      },
+      field.member);
+}
+
+void set_from_text(Scene& scene, const SceneField& field, std::string_view text, const std::string& where) {
+  const auto number = [&] {
+    const auto value = parse_number(text);
+    if (!value) refuse(field, quoted(text), "a number, " + range_text(field), where);
+    return *value;
+  };
+  std::visit(Overloaded{
+                 [&](bool Scene::*member) { scene.*member = true; },
+                 [&](std::string Scene::*member) { scene.*member = text; },
+                 [&](PathMember member) { scene.*(member.path) = text; },
+                 [&](int Scene::*member) {
+                   const auto value = parse_int(text);
+                   if (!value) refuse(field, quoted(text), "a whole number, " + range_text(field), where);
+                   scene.*member = *value;
+                 },
+                 [&](double Scene::*member) { scene.*member = number(); },
+                 [&](std::optional<double> Scene::*member) { scene.*member = number(); },
+                 [&](Eigen::Vector3d Scene::*member) { scene.*member = parse_vector(field, text, where); },
+                 [&](std::optional<FrameRange> Scene::*member) { scene.*member = parse_frames(text, where); },
+                 [&](Integrator Scene::*member) {
+                   scene.*member = parse_choice<Integrator>(kIntegratorNames, text, where);
+                 },
+                 [&](OutputSpace Scene::*member) {
+                   scene.*member = parse_choice<OutputSpace>(kOutputSpaceNames, text, where);
+                 },
+             },
+             field.member);
+  check_field(scene, field, where);
+}
+
+std::string toml_value(const Scene& scene, const SceneField& field) {
+  const auto text = [&](const std::string& value) { return value.empty() ? "" : toml_string(field, value); };
+  const auto choice = [](const std::vector<std::string>& names, auto value) {
+    return fmt::format("\"{}\"", names[static_cast<std::size_t>(value)]);
+  };
+  // fmt's {} writes the shortest text that reads back as the same double.
+  return std::visit(
+      Overloaded{
+          [&](bool Scene::*member) { return std::string(scene.*member ? "true" : "false"); },
+          [&](std::string Scene::*member) { return text(scene.*member); },
+          [&](PathMember member) { return text(scene.*(member.path)); },
+          [&](int Scene::*member) { return fmt::format("{}", scene.*member); },
+          [&](double Scene::*member) { return fmt::format("{}", scene.*member); },
+          [&](std::optional<double> Scene::*member) {
+            return scene.*member ? fmt::format("{}", *(scene.*member)) : std::string();
+          },
+          [&](Eigen::Vector3d Scene::*member) { return fmt::format("[{}]", fmt::join(scene.*member, ", ")); },
+          [&](std::optional<FrameRange> Scene::*member) {
+            return scene.*member ? fmt::format("\"{}-{}\"", (scene.*member)->first, (scene.*member)->last)
+                                 : std::string();
+          },
+          [&](Integrator Scene::*member) { return choice(kIntegratorNames, scene.*member); },
+          [&](OutputSpace Scene::*member) { return choice(kOutputSpaceNames, scene.*member); },
+      },
+      field.member);
+}
+
+}  // namespace sinew::tools

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace sinew::tools {
+
+/// Fewest insertions, deletions, replacements and swaps of neighbours that turn `a` into `b` (no part edited
+/// twice).
+int edit_distance(std::string_view a, std::string_view b);
+
+/// The candidate nearest to `word`, the first of several; empty where none is near (more than a third of the
+/// letters, and more than two, would have to change).
+std::string nearest(std::string_view word, const std::vector<std::string>& candidates);
+
+}  // namespace sinew::tools
