@@ -1,0 +1,529 @@
+#include "fem/blended_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+namespace sinew::fem {
+namespace {
+
+using lattice::Points;
+using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// The functions in which systems are written, over all leaf vertices.
+struct Coordinates {
+  RowSparse values;         ///< leaf vertices x functions.
+  std::vector<int> vertex;  ///< leaf vertex of a function.
+  std::vector<std::uint8_t>
+      is_value;  ///< the coefficient is a position (moves with translation), not a detail.
+  std::vector<std::uint8_t> is_known;      ///< on a bone.
+  std::vector<int> parent_start, parents;  ///< of details: leaf vertices whose mean is subtracted.
+
+  int num_functions() const { return static_cast<int>(vertex.size()); }
+
+  /// Coefficients of the functions from vertex values.
+  void analyse(const Points& from, Points& to) const {
+    to.resize(num_functions(), 3);
+    for (int f = 0; f < num_functions(); ++f) {
+      const auto i = static_cast<std::size_t>(f);
+      Eigen::RowVector3d value = from.row(vertex[i]);
+      const int begin = parent_start[i], end = parent_start[i + 1];
+      if (begin < end) {
+        Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
+        for (int p = begin; p < end; ++p) mean += from.row(parents[static_cast<std::size_t>(p)]);
+        value -= mean / static_cast<double>(end - begin);
+      }
+      to.row(f) = value;
+    }
+  }
+};
+
+Coordinates hierarchical_coordinates(const Body& body) {
+  Coordinates c;
+  c.values = body.mesh.values_from_coefficients;
+  c.parent_start.push_back(0);
+  for (int v : body.mesh.functions) {
+    const int leaf = body.mesh.leaf_of_vertex[static_cast<std::size_t>(v)];
+    c.vertex.push_back(leaf);
+    for (int p : body.hierarchy.parents(v))
+      c.parents.push_back(body.mesh.leaf_of_vertex[static_cast<std::size_t>(p)]);
+    c.parent_start.push_back(static_cast<int>(c.parents.size()));
+    c.is_value.push_back(body.hierarchy.level(v) == 0);
+    c.is_known.push_back(body.bones.is_bone[static_cast<std::size_t>(leaf)]);
+  }
+  return c;
+}
+
+/// Hats of the leaf vertices; right only where every leaf vertex but those on bones is active.
+Coordinates nodal_coordinates(const Body& body) {
+  Coordinates c;
+  const int n = body.mesh.num_vertices();
+  c.values.resize(n, n);
+  c.values.setIdentity();
+  c.parent_start.assign(static_cast<std::size_t>(n) + 1, 0);
+  c.is_value.assign(static_cast<std::size_t>(n), 1);
+  c.is_known = body.bones.is_bone;
+  for (int a = 0; a < n; ++a) c.vertex.push_back(a);
+  return c;
+}
+
+/// Everything of one region that does not change with the step size.
+struct RegionSystem {
+  const Region* region = nullptr;
+  std::vector<int> functions;  ///< unknown ones first, then known neighbours.
+  int num_unknown = 0;
+  std::vector<int>
+      vertices;  ///< leaf vertices: rows (where an unknown function lives) first, then their neighbours.
+  int num_rows = 0;
+  RowSparse values;            ///< vertices x functions (local).
+  RowSparse rows_to_unknown;   ///< num_unknown x num_rows: transpose of the unknown part of `values`.
+  std::vector<int> row_start;  ///< of the rows' neighbours,
+  std::vector<int> column;     ///< as local vertices;
+  std::vector<int> entry;      ///< entries of the body's matrices start here, per row.
+  std::vector<std::uint8_t> row_has_tie;
+  std::vector<int> blended;  ///< local vertex of each of region->vertices, -1 for bone vertices.
+  std::vector<std::pair<int, std::vector<std::pair<int, int>>>> ties;  ///< tie, (its entry, local row).
+
+  // Buffers of the step, so that a step allocates nothing.
+  Points m, z, p, m_value, z_value, p_value, row_force;
+  Eigen::VectorXd solution, workspace;
+  Points result;  ///< contribution to the blended velocity, one row per region->vertices.
+};
+
+}  // namespace
+
+struct BlendedSolver::Impl {
+  const Body* body = nullptr;
+  SolverOptions options;
+  Coordinates coordinates;
+  std::vector<RegionSystem> systems;
+  std::map<std::pair<double, Integrator>, std::vector<Factor>> factors;
+  std::vector<std::vector<int>> vertex_cells;  ///< leaf cells round a leaf vertex.
+  std::vector<std::vector<int>> vertex_functions;
+
+  void build_systems();
+  RegionSystem build_system(const Region& region) const;
+  Eigen::SparseMatrix<double> matrix_of(const RegionSystem& system, const SystemFactors& c) const;
+  struct StepData;
+  void solve_region(std::size_t index, const StepData& step, const Factor& factor);
+};
+
+namespace {
+
+std::vector<std::uint8_t> grow(const lattice::LeafMesh& mesh, const std::vector<std::uint8_t>& cells) {
+  std::vector<std::uint8_t> touched(static_cast<std::size_t>(mesh.num_vertices()), 0);
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    if (!cells[c]) continue;
+    for (int a : mesh.cells[c]) touched[static_cast<std::size_t>(a)] = 1;
+  }
+  std::vector<std::uint8_t> grown(cells.size(), 0);
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (int a : mesh.cells[c]) grown[c] = grown[c] || touched[static_cast<std::size_t>(a)];
+  }
+  return grown;
+}
+
+}  // namespace
+
+RegionSystem BlendedSolver::Impl::build_system(const Region& region) const {
+  const lattice::LeafMesh& mesh = body->mesh;
+  RegionSystem system;
+  system.region = &region;
+  // Core: leaf cells with a vertex of w > 0. Unknown: functions whose support meets the core, and those whose
+  // own vertex lies in the rings round it.
+  std::vector<std::uint8_t> core(mesh.cells.size(), 0);
+  for (int a : region.vertices) {
+    for (int c : vertex_cells[static_cast<std::size_t>(a)]) core[static_cast<std::size_t>(c)] = 1;
+  }
+  std::vector<std::uint8_t> ringed = core;
+  for (int r = 0; r < options.rings; ++r) ringed = grow(mesh, ringed);
+  std::vector<std::uint8_t> is_unknown(static_cast<std::size_t>(coordinates.num_functions()), 0);
+  std::vector<std::uint8_t> in_ring(static_cast<std::size_t>(mesh.num_vertices()), 0);
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    for (int a : mesh.cells[c]) {
+      if (ringed[c]) in_ring[static_cast<std::size_t>(a)] = 1;
+      if (!core[c]) continue;
+      for (int f : vertex_functions[static_cast<std::size_t>(a)]) is_unknown[static_cast<std::size_t>(f)] = 1;
+    }
+  }
+  for (int f = 0; f < coordinates.num_functions(); ++f) {
+    const auto i = static_cast<std::size_t>(f);
+    if (in_ring[static_cast<std::size_t>(coordinates.vertex[i])]) is_unknown[i] = 1;
+    if (coordinates.is_known[i]) is_unknown[i] = 0;
+  }
+  std::vector<int> local_function(is_unknown.size(), -1);
+  for (int f = 0; f < coordinates.num_functions(); ++f) {
+    if (!is_unknown[static_cast<std::size_t>(f)]) continue;
+    local_function[static_cast<std::size_t>(f)] = static_cast<int>(system.functions.size());
+    system.functions.push_back(f);
+  }
+  system.num_unknown = static_cast<int>(system.functions.size());
+
+  // Rows: vertices where an unknown function does not vanish; then their neighbours.
+  std::vector<int> local_vertex(static_cast<std::size_t>(mesh.num_vertices()), -1);
+  for (int a = 0; a < mesh.num_vertices(); ++a) {
+    const auto& functions = vertex_functions[static_cast<std::size_t>(a)];
+    if (std::none_of(functions.begin(), functions.end(),
+                     [&](int f) { return is_unknown[static_cast<std::size_t>(f)]; }))
+      continue;
+    local_vertex[static_cast<std::size_t>(a)] = static_cast<int>(system.vertices.size());
+    system.vertices.push_back(a);
+  }
+  system.num_rows = static_cast<int>(system.vertices.size());
+  const LeafMatrices& matrices = body->matrices;
+  system.row_start.push_back(0);
+  for (int r = 0; r < system.num_rows; ++r) {
+    const auto a = static_cast<std::size_t>(system.vertices[static_cast<std::size_t>(r)]);
+    system.entry.push_back(matrices.row_start[a]);
+    bool tied = false;
+    for (int e = matrices.row_start[a]; e < matrices.row_start[a + 1]; ++e) {
+      const auto b = static_cast<std::size_t>(matrices.column[static_cast<std::size_t>(e)]);
+      tied = tied || matrices.tie[static_cast<std::size_t>(e)] != 0.0;
+      if (local_vertex[b] < 0) {
+        local_vertex[b] = static_cast<int>(system.vertices.size());
+        system.vertices.push_back(static_cast<int>(b));
+      }
+      system.column.push_back(local_vertex[b]);
+    }
+    system.row_start.push_back(static_cast<int>(system.column.size()));
+    system.row_has_tie.push_back(tied);
+  }
+  std::vector<Eigen::Triplet<double>> triplets, transposed;
+  for (std::size_t r = 0; r < system.vertices.size(); ++r) {
+    for (RowSparse::InnerIterator it(coordinates.values, system.vertices[r]); it; ++it) {
+      int& local = local_function[static_cast<std::size_t>(it.col())];
+      if (local < 0) {
+        local = static_cast<int>(system.functions.size());
+        system.functions.push_back(static_cast<int>(it.col()));
+      }
+      triplets.emplace_back(static_cast<int>(r), local, it.value());
+      if (local < system.num_unknown) transposed.emplace_back(local, static_cast<int>(r), it.value());
+    }
+  }
+  system.values.resize(static_cast<Eigen::Index>(system.vertices.size()),
+                       static_cast<Eigen::Index>(system.functions.size()));
+  system.values.setFromTriplets(triplets.begin(), triplets.end());
+  system.rows_to_unknown.resize(system.num_unknown, system.num_rows);
+  system.rows_to_unknown.setFromTriplets(transposed.begin(), transposed.end());
+  for (int a : region.vertices) {
+    system.blended.push_back(
+        body->bones.is_bone[static_cast<std::size_t>(a)] ? -1 : local_vertex[static_cast<std::size_t>(a)]);
+  }
+  for (std::size_t t = 0; t < body->ties.size(); ++t) {
+    std::vector<std::pair<int, int>> rows;
+    for (std::size_t k = 0; k < body->ties[t].vertices.size(); ++k) {
+      const int r = local_vertex[static_cast<std::size_t>(body->ties[t].vertices[k])];
+      if (r >= 0 && r < system.num_rows) rows.emplace_back(static_cast<int>(k), r);
+    }
+    if (!rows.empty()) system.ties.emplace_back(static_cast<int>(t), std::move(rows));
+  }
+  const auto num_functions = static_cast<Eigen::Index>(system.functions.size());
+  for (Points* buffer : {&system.m, &system.z, &system.p}) buffer->resize(num_functions, 3);
+  system.row_force.resize(system.num_rows, 3);
+  system.solution.resize(3 * system.num_unknown);
+  system.result.resize(static_cast<Eigen::Index>(region.vertices.size()), 3);
+  return system;
+}
+
+void BlendedSolver::Impl::build_systems() {
+  const lattice::LeafMesh& mesh = body->mesh;
+  vertex_cells.resize(static_cast<std::size_t>(mesh.num_vertices()));
+  vertex_functions.resize(vertex_cells.size());
+  for (int c = 0; c < static_cast<int>(mesh.cells.size()); ++c) {
+    for (int a : mesh.cells[static_cast<std::size_t>(c)])
+      vertex_cells[static_cast<std::size_t>(a)].push_back(c);
+  }
+  for (int a = 0; a < mesh.num_vertices(); ++a) {
+    for (RowSparse::InnerIterator it(coordinates.values, a); it; ++it) {
+      vertex_functions[static_cast<std::size_t>(a)].push_back(static_cast<int>(it.col()));
+    }
+  }
+  systems.resize(body->regions.size());
+  tbb::parallel_for(std::size_t{0}, systems.size(),
+                    [&](std::size_t i) { systems[i] = build_system(body->regions[i]); });
+}
+
+BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->body = &body;
+  impl_->options = options;
+  impl_->coordinates =
+      options.basis == Basis::Nodal ? nodal_coordinates(body) : hierarchical_coordinates(body);
+  impl_->build_systems();
+}
+BlendedSolver::~BlendedSolver() = default;
+BlendedSolver::BlendedSolver(BlendedSolver&&) noexcept = default;
+
+/// A_i = B_U^T (cM M + cK K + cP P) B_U over the region's rows.
+Eigen::SparseMatrix<double> BlendedSolver::Impl::matrix_of(const RegionSystem& system,
+                                                           const SystemFactors& scale) const {
+  const LeafMatrices& matrices = body->matrices;
+  std::vector<Eigen::Triplet<double>> triplets;
+  triplets.reserve(9 * system.column.size());
+  for (int r = 0; r < system.num_rows; ++r) {
+    const auto row = static_cast<std::size_t>(r);
+    for (int k = system.row_start[row]; k < system.row_start[row + 1]; ++k) {
+      const int column = system.column[static_cast<std::size_t>(k)];
+      if (column >= system.num_rows) continue;
+      const auto e = static_cast<std::size_t>(system.entry[row] + k - system.row_start[row]);
+      Eigen::Matrix3d block = scale.stiffness * matrices.stiffness[e];
+      block.diagonal().array() += scale.mass * matrices.mass[e] + scale.tie * matrices.tie[e];
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) triplets.emplace_back(3 * r + i, 3 * column + j, block(i, j));
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> nodal(3 * system.num_rows, 3 * system.num_rows);
+  nodal.setFromTriplets(triplets.begin(), triplets.end());
+  triplets.clear();
+  for (int f = 0; f < system.num_unknown; ++f) {
+    for (RowSparse::InnerIterator it(system.rows_to_unknown, f); it; ++it) {
+      for (int c = 0; c < 3; ++c)
+        triplets.emplace_back(3 * static_cast<int>(it.col()) + c, 3 * f + c, it.value());
+    }
+  }
+  Eigen::SparseMatrix<double> basis(3 * system.num_rows, 3 * system.num_unknown);
+  basis.setFromTriplets(triplets.begin(), triplets.end());
+  return basis.transpose() * (nodal * basis);
+}
+
+Factor::Report BlendedSolver::prepare(double h, Integrator integrator) {
+  auto& factors = impl_->factors[{h, integrator}];
+  if (!factors.empty() || impl_->systems.empty()) {
+    Factor::Report done;
+    done.ok = true;
+    return done;
+  }
+  const SystemFactors c =
+      system_factors(stage_of(integrator), h, impl_->body->damping.alpha(), impl_->body->damping.beta());
+  factors.resize(impl_->systems.size());
+  std::vector<Factor::Report> reports(impl_->systems.size());
+  tbb::parallel_for(std::size_t{0}, factors.size(), [&](std::size_t i) {
+    if (impl_->systems[i].num_unknown == 0) {
+      reports[i].ok = true;
+    } else {
+      reports[i] = factors[i].factorise(impl_->matrix_of(impl_->systems[i], c), impl_->options.precision);
+    }
+  });
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    if (reports[i].ok) continue;
+    const Region& region = *impl_->systems[i].region;
+    reports[i].message = "region of '" +
+                         impl_->body->tree.frames[static_cast<std::size_t>(region.second)].name +
+                         "': " + reports[i].message;
+    impl_->factors.erase({h, integrator});
+    return reports[i];
+  }
+  Factor::Report done;
+  done.ok = true;
+  return done;
+}
+
+/// What all regions of one stage share.
+struct BlendedSolver::Impl::StepData {
+  const State* state;
+  StagePoses poses;
+  Stage stage;
+  double h, alpha, beta;
+  double elapsed;  ///< from the begin of the step to the stage [s].
+  Eigen::Vector3d gravity;
+  bool use_past;
+  Points x_h, v_h, x_known, v_known, x_now, x_past;  ///< coefficients.
+};
+
+void BlendedSolver::Impl::solve_region(std::size_t index, const StepData& step, const Factor& factor) {
+  RegionSystem& s = systems[index];
+  const Region& region = *s.region;
+  const RegionTransform end = transform_of(region, *step.poses.stage);
+  const RegionTransform now = transform_of(region, *step.poses.now);
+  const RegionTransform past = step.use_past ? transform_of(region, *step.poses.before) : now;
+  const Eigen::Matrix3d to_local = end.rotation.transpose();
+  const double th = step.stage.theta * step.h;
+  const double b = step.beta / (step.stage.kappa * step.h);
+  const Eigen::Affine3d carried = end.from_rest * now.from_rest.inverse();
+  for (std::size_t k = 0; k < s.functions.size(); ++k) {
+    const int f = s.functions[k];
+    const bool known = static_cast<int>(k) >= s.num_unknown;
+    const bool value = coordinates.is_value[static_cast<std::size_t>(f)] != 0;
+    const Eigen::Vector3d rest =
+        value ? Eigen::Vector3d(
+                    body->mesh.points.row(coordinates.vertex[static_cast<std::size_t>(f)]).transpose() -
+                    region.origin_rest)
+              : Eigen::Vector3d(0, 0, 0);
+    const auto local = [&](const RegionTransform& t, const Eigen::Vector3d& x) -> Eigen::Vector3d {
+      return t.rotation.transpose() * (value ? Eigen::Vector3d(x - t.origin) : x);
+    };
+    const Eigen::Vector3d x_stage = known ? step.x_known.row(f).transpose() : step.x_h.row(f).transpose();
+    const Eigen::Vector3d p = local(end, x_stage);
+    const Eigen::Vector3d u_end = p - rest;
+    Eigen::Vector3d u_past = local(now, step.x_now.row(f).transpose()) - rest;
+    if (step.use_past) u_past = (4.0 * u_past - (local(past, step.x_past.row(f).transpose()) - rest)) / 3.0;
+    const Eigen::Vector3d x_now = step.x_now.row(f).transpose();
+    const Eigen::Vector3d moved =
+        value ? Eigen::Vector3d(carried * x_now) : Eigen::Vector3d(carried.linear() * x_now);
+    const Eigen::Vector3d v_frame = (moved - x_now) / step.elapsed;
+    Eigen::Vector3d inertia = step.v_h.row(f).transpose() + (th * step.alpha) * v_frame;
+    if (known) inertia -= (1.0 + th * step.alpha) * step.v_known.row(f).transpose();
+    const auto row = static_cast<Eigen::Index>(k);
+    s.m.row(row) = (to_local * inertia).transpose();
+    s.z.row(row) = ((1.0 + b) * u_end - b * u_past).transpose();
+    s.p.row(row) = p.transpose();
+  }
+  s.m_value.noalias() = s.values * s.m;
+  s.z_value.noalias() = s.values * s.z;
+  s.p_value.noalias() = s.values * s.p;
+
+  const Eigen::Vector3d gravity = th * (to_local * step.gravity);
+  const LeafMatrices& matrices = body->matrices;
+  for (int r = 0; r < s.num_rows; ++r) {
+    const auto row = static_cast<std::size_t>(r);
+    Eigen::Vector3d inertia = Eigen::Vector3d::Zero(), elastic = Eigen::Vector3d::Zero(),
+                    tie = Eigen::Vector3d::Zero();
+    const auto first = static_cast<std::size_t>(s.entry[row]) - static_cast<std::size_t>(s.row_start[row]);
+    for (int k = s.row_start[row]; k < s.row_start[row + 1]; ++k) {
+      const auto e = first + static_cast<std::size_t>(k);
+      const Eigen::Index c = s.column[static_cast<std::size_t>(k)];
+      inertia += matrices.mass[e] * s.m_value.row(c).transpose();
+      elastic += matrices.stiffness[e] * s.z_value.row(c).transpose();
+      if (s.row_has_tie[row]) tie += matrices.tie[e] * s.p_value.row(c).transpose();
+    }
+    const double mass = body->vertex_mass[static_cast<std::size_t>(s.vertices[row])];
+    s.row_force.row(r) = (inertia - th * (elastic + tie) + mass * gravity).transpose();
+  }
+  for (const auto& [t, rows] : s.ties) {
+    const Tie& tie = body->ties[static_cast<std::size_t>(t)];
+    const Eigen::Affine3d& target = step.poses.stage->frames[static_cast<std::size_t>(tie.frame)].from_rest;
+    const Eigen::Matrix3d turn = to_local * target.linear();
+    const Eigen::Vector3d centre = to_local * (target * tie.centre_rest - end.origin);
+    for (const auto& [k, r] : rows) {
+      const auto i = static_cast<std::size_t>(k);
+      s.row_force.row(r) += th * (turn * tie.first[i] + tie.zeroth[i] * centre).transpose();
+    }
+  }
+  Eigen::Map<Points>(s.solution.data(), s.num_unknown, 3).noalias() = s.rows_to_unknown * s.row_force;
+  factor.solve(s.solution, s.workspace);
+
+  // Velocity of every local function in rotated axes, then at the region's vertices, back in the world,
+  // weighted.
+  s.m.topRows(s.num_unknown) = Eigen::Map<const Points>(s.solution.data(), s.num_unknown, 3);
+  for (std::size_t k = static_cast<std::size_t>(s.num_unknown); k < s.functions.size(); ++k) {
+    s.m.row(static_cast<Eigen::Index>(k)) = step.v_known.row(s.functions[k]) * end.rotation;
+  }
+  for (std::size_t k = 0; k < s.blended.size(); ++k) {
+    Eigen::RowVector3d y = Eigen::RowVector3d::Zero();
+    if (s.blended[k] >= 0) {
+      for (RowSparse::InnerIterator it(s.values, s.blended[k]); it; ++it) y += it.value() * s.m.row(it.col());
+    }
+    s.result.row(static_cast<Eigen::Index>(k)) = region.weights[k] * (y * end.rotation.transpose());
+  }
+}
+
+namespace {
+
+/// v* of all leaf vertices: exact on bones; elsewhere skinned position plus velocity relative to the frames.
+Points known_velocity(const Body& body, const State& state, const Points& x_h, const StagePoses& poses,
+                      double elapsed, double eta_h, bool need_neighbours) {
+  Points v = Points::Zero(body.mesh.num_vertices(), 3);
+  if (need_neighbours) {
+    const auto num_frames = body.tree.frames.size();
+    const double past_h = poses.before != nullptr ? poses.now->time - poses.before->time : 0.0;
+    std::vector<Eigen::Affine3d> forward(num_frames), backward(num_frames);
+    std::vector<Eigen::Matrix3d> turn(num_frames);
+    for (std::size_t f = 0; f < num_frames; ++f) {
+      const FrameTransform& now = poses.now->frames[f];
+      forward[f] = poses.stage->frames[f].from_rest * now.to_rest;
+      turn[f] = poses.stage->frames[f].rotation * now.rotation.transpose();
+      if (poses.before != nullptr) backward[f] = poses.before->frames[f].from_rest * now.to_rest;
+    }
+    tbb::parallel_for(0, body.mesh.num_vertices(), [&](int a) {
+      const Eigen::Vector3d x = state.x.row(a).transpose();
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+        const auto f = static_cast<std::size_t>(it.col());
+        Eigen::Vector3d velocity = (forward[f] * x - x) / elapsed;
+        if (poses.before != nullptr) {
+          velocity += turn[f] * (state.v.row(a).transpose() - (x - backward[f] * x) / past_h);
+        }
+        sum += it.value() * velocity;
+      }
+      v.row(a) = sum.transpose();
+    });
+  }
+  for (const BoneVertex& bone : body.bones.vertices) {
+    v.row(bone.vertex) =
+        (bone_position(bone, poses.stage->joints).transpose() - x_h.row(bone.vertex)) / eta_h;
+  }
+  return v;
+}
+
+}  // namespace
+
+lattice::Points BlendedSolver::stage_velocity(const State& state, const Points& x_h, const Points& v_h,
+                                              const StagePoses& poses, double h, Integrator integrator,
+                                              const Eigen::Vector3d& gravity, bool use_past) {
+  const Body& body = *impl_->body;
+  Impl::StepData step;
+  step.state = &state;
+  step.poses = poses;
+  step.stage = stage_of(integrator);
+  step.h = h;
+  step.alpha = body.damping.alpha();
+  step.beta = body.damping.beta();
+  step.gravity = gravity;
+  step.use_past = use_past;
+  const double eta_h = step.stage.eta * h;
+  // A start's stage lies at t + eta h, a regular one at t + h.
+  step.elapsed = use_past ? h : eta_h;
+  const Points v_known =
+      known_velocity(body, state, x_h, poses, step.elapsed, eta_h, impl_->systems.size() > 1);
+  const Points x_known = x_h + eta_h * v_known;
+  const Coordinates& coordinates = impl_->coordinates;
+  coordinates.analyse(x_h, step.x_h);
+  coordinates.analyse(v_h, step.v_h);
+  coordinates.analyse(x_known, step.x_known);
+  coordinates.analyse(v_known, step.v_known);
+  coordinates.analyse(state.x, step.x_now);
+  if (use_past) coordinates.analyse(state.x_past, step.x_past);
+
+  const std::vector<Factor>& factors = impl_->factors.at({h, integrator});
+  tbb::parallel_for(std::size_t{0}, impl_->systems.size(), [&](std::size_t i) {
+    if (impl_->systems[i].num_unknown > 0) impl_->solve_region(i, step, factors[i]);
+  });
+  // Blend in region order: the same bits for any number of threads.
+  Points v = Points::Zero(body.mesh.num_vertices(), 3);
+  for (const RegionSystem& s : impl_->systems) {
+    if (s.num_unknown == 0) continue;
+    for (std::size_t k = 0; k < s.blended.size(); ++k) {
+      v.row(s.region->vertices[k]) += s.result.row(static_cast<Eigen::Index>(k));
+    }
+  }
+  for (const BoneVertex& bone : body.bones.vertices) v.row(bone.vertex) = v_known.row(bone.vertex);
+  // Inactive vertices follow their parents: only the active functions are unknowns.
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    const int vertex = body.mesh.vertices[static_cast<std::size_t>(a)];
+    if (body.hierarchy.level(vertex) == 0 || impl_->body->bones.is_bone[static_cast<std::size_t>(a)])
+      continue;
+    if (std::binary_search(body.mesh.functions.begin(), body.mesh.functions.end(), vertex)) continue;
+    Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
+    const auto parents = body.hierarchy.parents(vertex);
+    for (int p : parents) mean += v.row(body.mesh.leaf_of_vertex[static_cast<std::size_t>(p)]);
+    v.row(a) = mean / static_cast<double>(parents.size());
+  }
+  return v;
+}
+
+SolverCounts BlendedSolver::counts() const {
+  SolverCounts counts;
+  counts.regions = static_cast<int>(impl_->systems.size());
+  counts.functions = impl_->body->mesh.num_functions();
+  for (const RegionSystem& s : impl_->systems) counts.unknowns.push_back(s.num_unknown);
+  if (!impl_->factors.empty()) {
+    for (const Factor& factor : impl_->factors.begin()->second)
+      counts.factor_nonzeros += factor.num_nonzeros();
+  }
+  return counts;
+}
+
+}  // namespace sinew::fem

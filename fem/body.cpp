@@ -1,0 +1,180 @@
+#include "fem/body.h"
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+#include <string>
+
+namespace sinew::fem {
+namespace {
+
+void require(bool holds, const std::string& field, double value, const std::string& rule) {
+  if (!holds) throw std::invalid_argument(field + ": got " + std::to_string(value) + ", expected " + rule);
+}
+
+void validate_material(const Material& m) {
+  require(m.young > 0.0, "young", m.young, "a positive number of pascals");
+  require(m.poisson > -1.0 && m.poisson < 0.5, "poisson", m.poisson, "-1 < nu < 0.5");
+  require(m.density > 0.0, "density", m.density, "a positive number of kg/m^3");
+}
+
+/// Leaf cells whose level-0 owner cell ... the dominant frame of a cell: the frame with the largest sum over
+/// corners.
+int dominant_frame(const FrameWeights& weights, const lattice::HexVertices& cell) {
+  std::map<int, double> sums;
+  for (int a : cell) {
+    for (FrameWeights::InnerIterator it(weights, a); it; ++it) sums[static_cast<int>(it.col())] += it.value();
+  }
+  int best = 0;
+  double largest = -1.0;
+  for (const auto& [frame, sum] : sums) {
+    if (sum > largest) {
+      best = frame;
+      largest = sum;
+    }
+  }
+  return best;
+}
+
+std::vector<Material> frame_materials(const FrameTree& tree, const BodyOptions& options) {
+  std::vector<Material> materials(tree.frames.size(), options.material);
+  for (const JointMaterial& m : options.materials) {
+    const int f = tree.frame_of_joint[static_cast<std::size_t>(m.joint)];
+    if (f >= 0) materials[static_cast<std::size_t>(f)] = m.material;
+  }
+  return materials;
+}
+
+std::vector<std::vector<int>> hard_chains(const lattice::ControlLattice& lattice) {
+  std::vector<std::vector<int>> chains;
+  for (const auto& bone : lattice.bones) {
+    if (!bone.chain.empty()) chains.push_back(bone.chain);
+  }
+  return chains;
+}
+
+void check_orientation(const lattice::LeafMesh& mesh) {
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    const auto corners = lattice::hex_corners(mesh.points, mesh.cells[c]);
+    for (int q = 0; q < 8; ++q) {
+      if (!(lattice::trilinear_jacobian(corners, gauss_point(q)).determinant() > 0.0)) {
+        throw std::invalid_argument("leaf cell " + std::to_string(c) + " is inverted at rest");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void BodyOptions::validate() const {
+  require(levels >= 0 && levels <= 3, "levels", levels, "0 to 3");
+  validate_material(material);
+  for (const JointMaterial& m : materials) validate_material(m.material);
+  require(damping.ratio >= 0.0, "damping", damping.ratio, ">= 0");
+  require(damping.frequency > 0.0, "damping_frequency", damping.frequency, "a positive number of hertz");
+  require(ties.stiffness >= 0.0, "twist stiffness", ties.stiffness, ">= 0");
+  require(ties.radius > 0.0, "twist radius", ties.radius, "> 0");
+}
+
+Body make_body(const BodyInput& input, const BodyOptions& options) {
+  options.validate();
+  const double h = input.lattice.edge_length;
+  lattice::Hierarchy hierarchy(input.lattice.complex, std::max(1, options.levels));
+  const lattice::ActiveSet active =
+      lattice::uniform_active_set(hierarchy, options.levels, hard_chains(input.lattice));
+  lattice::LeafMesh mesh = lattice::leaf_mesh(hierarchy, active);
+  check_orientation(mesh);
+
+  // Drop cells without flesh; embed again in what is left, since indices change.
+  const lattice::SurfaceQuery query(input.skin.points, input.skin.triangles);
+  lattice::Embedding skin = lattice::embed(mesh, input.skin.points);
+  std::vector<lattice::FillFractions> fill = lattice::fill_fractions(mesh, query, options.shell * h);
+  std::vector<std::uint8_t> keep = lattice::filled_cells(fill, skin.cell);
+  // A bone that runs outside the flesh still needs its vertices: keep the cells round chain vertices that
+  // would lose all of theirs.
+  std::vector<std::uint8_t> has_cell(static_cast<std::size_t>(mesh.num_vertices()), 0);
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    for (int a : mesh.cells[c])
+      has_cell[static_cast<std::size_t>(a)] = has_cell[static_cast<std::size_t>(a)] || keep[c];
+  }
+  std::vector<std::uint8_t> rescue(has_cell.size(), 0);
+  for (const auto& bone : input.lattice.bones) {
+    for (int v : bone.chain) {
+      const auto leaf = static_cast<std::size_t>(mesh.leaf_of_vertex[static_cast<std::size_t>(v)]);
+      rescue[leaf] = !has_cell[leaf];
+    }
+  }
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    for (int a : mesh.cells[c]) keep[c] = keep[c] || rescue[static_cast<std::size_t>(a)];
+  }
+  std::vector<lattice::FillFractions> kept_fill;
+  for (std::size_t c = 0; c < keep.size(); ++c) {
+    if (keep[c]) kept_fill.push_back(fill[c]);
+  }
+  if (kept_fill.empty()) throw std::invalid_argument("no lattice cell holds any flesh");
+  mesh = lattice::restrict_cells(hierarchy, mesh, keep);
+  skin = lattice::embed(mesh, input.skin.points);
+
+  FrameTree tree = frame_tree(input.lattice, input.skeleton);
+  BoneConstraints bones = bone_constraints(input.lattice, tree, hierarchy, mesh);
+  FrameWeights weights = frame_weights(hierarchy, mesh, skin, input.skin, tree, bones);
+
+  const std::vector<Material> of_frame = frame_materials(tree, options);
+  std::vector<Material> materials;
+  for (const auto& cell : mesh.cells)
+    materials.push_back(of_frame[static_cast<std::size_t>(dominant_frame(weights, cell))]);
+  LeafMatrices matrices = assemble(mesh, materials, kept_fill);
+  std::vector<double> mu_of_frame;
+  for (const Material& m : of_frame) mu_of_frame.push_back(m.mu());
+  const LimbRadii radii(input.lattice, tree, input.skin, h);
+  std::vector<Tie> ties = add_ties(input.lattice, tree, radii, mesh, mu_of_frame, h, options.ties, matrices);
+
+  std::vector<PosedFrames> posed;
+  for (const auto& pose : input.poses) posed.push_back(pose_frames(tree, pose, 0.0));
+  std::vector<Region> regions =
+      make_regions(input.lattice, tree, radii, mesh, weights, largest_bends(tree, posed), options.regions);
+
+  Body body{input.lattice,
+            std::move(hierarchy),
+            std::move(mesh),
+            std::move(skin),
+            std::move(kept_fill),
+            std::move(materials),
+            std::move(matrices),
+            std::move(tree),
+            std::move(weights),
+            std::move(bones),
+            std::move(ties),
+            std::move(regions),
+            options.damping,
+            {},
+            0.0,
+            0.0};
+  body.vertex_mass.assign(static_cast<std::size_t>(body.mesh.num_vertices()), 0.0);
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    for (int e = body.matrices.row_start[static_cast<std::size_t>(a)];
+         e < body.matrices.row_start[static_cast<std::size_t>(a) + 1]; ++e) {
+      body.vertex_mass[static_cast<std::size_t>(a)] += body.matrices.mass[static_cast<std::size_t>(e)];
+    }
+  }
+  for (std::size_t c = 0; c < body.mesh.cells.size(); ++c) {
+    for (double w : gauss_weights(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]), body.fill[c]))
+      body.volume += w;
+  }
+  body.size = (body.mesh.points.colwise().maxCoeff() - body.mesh.points.colwise().minCoeff()).norm();
+  return body;
+}
+
+double default_young(double thickness, double density, double poisson, double gravity) {
+  constexpr double kSwing = 8.0;  // f [Hz]
+  const double mu = std::max(16.0 * density * kSwing * kSwing * thickness * thickness,
+                             density * gravity * thickness / 0.12);
+  return 2.0 * (1.0 + poisson) * mu;
+}
+
+double limb_thickness(const lattice::ControlLattice& lattice, const lattice::Surface& skin,
+                      const skeleton::Skeleton& skeleton) {
+  return LimbRadii(lattice, frame_tree(lattice, skeleton), skin, lattice.edge_length).typical();
+}
+
+}  // namespace sinew::fem

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fem/leaf_matrices.h"
+#include "fem/regions.h"
+#include "fem/ties.h"
+#include "lattice/embedding.h"
+#include "lattice/fill.h"
+
+/// The flesh: everything about a character that does not change while it moves.
+namespace sinew::fem {
+
+/// Material of the flesh whose dominant frame is that of `joint`.
+struct JointMaterial {
+  int joint = -1;  ///< joint of the skeleton.
+  Material material;
+};
+
+struct BodyOptions {
+  /// Finest level with active functions; 0 .. 3. Level 1 is the least that bends well: level-0 tetrahedra
+  /// alone are 48 % too stiff at nu = 0.3.
+  int levels = 1;
+  Material material;                     ///< where nothing else is said.
+  std::vector<JointMaterial> materials;  ///< overrides.
+  Damping damping;
+  TieOptions ties;
+  RegionOptions regions;
+  /// Open sheets have no inside: flesh reaches this share of the edge length from the skin [-].
+  double shell = 0.03;
+
+  /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
+  void validate() const;
+};
+
+/// Built once by make_body; read by the solvers.
+struct Body {
+  lattice::ControlLattice lattice;
+  lattice::Hierarchy hierarchy;
+  lattice::LeafMesh mesh;
+  lattice::Embedding skin;                   ///< of surface.points.
+  std::vector<lattice::FillFractions> fill;  ///< per leaf cell.
+  std::vector<Material> materials;           ///< per leaf cell.
+  LeafMatrices matrices;
+  FrameTree tree;
+  FrameWeights weights;  ///< s_f of leaf vertices.
+  BoneConstraints bones;
+  std::vector<Tie> ties;
+  std::vector<Region> regions;
+  Damping damping;
+  std::vector<double> vertex_mass;  ///< row sums of M [kg].
+  double volume = 0.0;              ///< of the flesh [m^3].
+  double size = 0.0;                ///< diagonal of the lattice's box [m].
+};
+
+/// Everything that make_body is given besides the options. `poses`: poses of the clip (pose_from_rest of
+/// every joint), for judging how far joints bend; at least one.
+struct BodyInput {
+  const lattice::ControlLattice& lattice;
+  const lattice::Surface& skin;
+  const skeleton::Skeleton& skeleton;
+  const std::vector<std::vector<Eigen::Affine3d>>& poses;
+};
+
+/// Throws std::invalid_argument where a cell is inverted, no cell holds flesh, or an option is out of range.
+Body make_body(const BodyInput& input, const BodyOptions& options = {});
+
+/// E that makes flesh swing at about 8 Hz and sag by about 6 % of its thickness t (DESIGN section 4):
+/// mu = max(16 rho f^2 t^2, rho g t / 0.12), E = 2 (1 + nu) mu [Pa].
+double default_young(double thickness, double density, double poisson, double gravity);
+
+/// Thickness t [m] for default_young: the median limb radius of the lattice's bones.
+double limb_thickness(const lattice::ControlLattice& lattice, const lattice::Surface& skin,
+                      const skeleton::Skeleton& skeleton);
+
+}  // namespace sinew::fem

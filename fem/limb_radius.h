@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include "fem/frames.h"
+#include "lattice/surface.h"
+
+namespace sinew::fem {
+
+/// How thick the flesh round a bone is (DESIGN section 5, "Limb radius").
+class LimbRadii {
+ public:
+  /// `window` h [m]: skin that projects onto the bone within it of a point counts there.
+  LimbRadii(const lattice::ControlLattice& lattice, const FrameTree& tree, const lattice::Surface& skin,
+            double window);
+
+  /// Whole-bone radius [m]: area-weighted median distance to the bone of the skin vertices whose dominant
+  /// frame is the bone's; a tenth of its length where there are none.
+  double of_bone(int bone) const { return bones_[static_cast<std::size_t>(bone)].median; }
+  /// Radius [m] near the point at distance `along` [m] from the bone's start, over the skin within the
+  /// window; else of_bone.
+  double near(int bone, double along) const;
+  /// Median over the bones [m]: t of DESIGN section 4.
+  double typical() const;
+
+ private:
+  struct Sample {
+    double along, distance, area;
+  };
+  struct Bone {
+    std::vector<Sample> samples;
+    double median = 0.0;
+  };
+  std::vector<Bone> bones_;
+  double window_ = 0.0;
+};
+
+}  // namespace sinew::fem

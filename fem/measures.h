@@ -1,0 +1,26 @@
+#pragma once
+
+#include "fem/body.h"
+
+namespace sinew::fem {
+
+/// What a frame reports about the flesh at one instant.
+struct Measures {
+  double kinetic = 0.0;        ///< 1/2 v^T M v [J].
+  double elastic = 0.0;        ///< 1/2 u^T K u, u of each cell in the rotation of its dominant frames [J].
+  double potential = 0.0;      ///< -m g . x, relative to the rest pose's [J].
+  double largest_speed = 0.0;  ///< [m/s].
+  double bone_residual = 0.0;  ///< largest distance of a bone vertex from the clip [m].
+  double largest_strain =
+      0.0;  ///< largest |principal stretch - 1| at a Gauss point of a mostly filled octant [-].
+  double min_det =
+      0.0;  ///< smallest det F at the Gauss points of the leaf cells (det J over rest det J) [-].
+  int min_det_cell = -1;
+  int inverted_cells = 0;  ///< leaf cells with det F <= 0 at a Gauss point.
+};
+
+/// x and v: leaf vertices, num_vertices x 3.
+Measures measure(const Body& body, const lattice::Points& x, const lattice::Points& v,
+                 const PosedFrames& posed, const Eigen::Vector3d& gravity);
+
+}  // namespace sinew::fem

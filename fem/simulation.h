@@ -1,0 +1,90 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "fem/blended_solver.h"
+#include "fem/measures.h"
+
+/// The time loop: settles the flesh, steps it along a motion, and samples it at any time between steps. Knows
+/// no files.
+namespace sinew::fem {
+
+/// pose_from_rest of every joint at a time [s]; must be defined for every time.
+using Motion = std::function<std::vector<Eigen::Affine3d>(double time)>;
+
+struct SimulationOptions {
+  /// Step h [s]; > 0. Belongs to the scene, never to the frame rate: the held pose depends slightly on it.
+  double step = 1.0 / 120.0;
+  Integrator integrator = Integrator::Bdf2;
+  Eigen::Vector3d gravity{0.0, -9.81, 0.0};  ///< [m/s^2].
+  double settle_limit = 5.0;                 ///< longest settling [s]; >= 0.
+  double settle_speed = 1e-3;                ///< settled when nothing moves faster [m/s].
+  /// A frame that turns more in one step halves the step, again and again [rad].
+  double largest_turn = 15.0 * 3.14159265358979323846 / 180.0;
+  SolverOptions solver;
+
+  /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
+  void validate() const;
+};
+
+enum class SimulationStatus { Ok, NotPositiveDefinite, Diverged, Stopped };
+
+/// How a call ended; `message` names time and place.
+struct SimulationReport {
+  SimulationStatus status = SimulationStatus::Ok;
+  double time = 0.0;   ///< of the last good state [s].
+  int steps = 0;       ///< taken by this call.
+  double speed = 0.0;  ///< settle: largest speed left [m/s].
+  std::string message;
+};
+
+class Simulation {
+ public:
+  /// Starts at rest in the pose of `start_time`. `body` must outlive it. `should_stop` is asked after every
+  /// step.
+  Simulation(const Body& body, Motion motion, double start_time, const SimulationOptions& options,
+             std::function<bool()> should_stop = {});
+
+  /// Lets the flesh come to rest in the starting pose, critically damped at the damping frequency; then gives
+  /// it the motion's velocity, so that nothing jolts at the first frame. Same step and matrices as the run.
+  [[nodiscard]] SimulationReport settle();
+
+  /// Steps until state().time >= time; does nothing when it is there already.
+  [[nodiscard]] SimulationReport advance_to(double time);
+
+  const State& state() const { return state_; }
+  /// Leaf vertices at a time between the last two states, moved in bone coordinates; bone vertices exactly on
+  /// the clip.
+  lattice::Points positions_at(double time) const;
+  /// Velocities there, linear between the states [m/s].
+  lattice::Points velocities_at(double time) const;
+  Measures measures_at(double time) const;
+  /// The embedded skin: rows of `positions`.
+  lattice::Points skin_of(const lattice::Points& positions) const { return body_.skin.weights * positions; }
+  SolverCounts counts() const { return solver_.counts(); }
+
+ private:
+  PosedFrames pose_at(double time) const { return pose_frames(body_.tree, motion_(time), time); }
+  int halvings_for(double begin, double h) const;
+  SimulationReport step_once(double h);
+  void set_bones(const PosedFrames& posed, lattice::Points& x) const;
+  bool check(SimulationReport& report) const;
+
+  const Body& body_;
+  Motion motion_;
+  SimulationOptions options_;
+  std::function<bool()> should_stop_;
+  BlendedSolver solver_;
+  double start_ = 0.0;
+  State state_, before_;     ///< now and one step earlier, for sampling.
+  PosedFrames now_, past_;   ///< their poses.
+  bool has_before_ = false;  ///< past_ is one real step earlier.
+  double last_h_ = 0.0;
+  long base_step_ = 0;  ///< whole steps taken: time is start + n h, never a running sum.
+  int halvings_ = 0;
+  int steps_since_change_ = 0;
+};
+
+}  // namespace sinew::fem

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <vector>
+
+#include "fem/frames.h"
+#include "fem/leaf_matrices.h"
+#include "fem/limb_radius.h"
+
+/// Penalties that tie flesh to a frame: the twist penalty of hard bones, soft bones and soft frames (DESIGN
+/// section 5).
+namespace sinew::fem {
+
+/// sum over bones of kappa/2 int_{tube} |p - T_b r(x)|^2 dV, with kappa = c mu / r^2.
+struct TieOptions {
+  double stiffness = 10.0;        ///< c of hard bones [-]; >= 0.
+  double soft_stiffness = 100.0;  ///< c of soft bones and soft frames [-]; > 0.
+  double radius = 0.25;  ///< r as a share of the local limb radius [-]; > 0. How thick the bone feels.
+};
+
+/// One tie: what its target T_b X contributes to the force, per leaf vertex it touches.
+struct Tie {
+  int frame = -1;  ///< frame index whose T it follows.
+  Eigen::Vector3d centre_rest{0, 0,
+                              0};  ///< C_b; moments are taken about it, so that far positions stay accurate.
+  std::vector<int> vertices;       ///< leaf vertices, ascending.
+  std::vector<double> zeroth;      ///< (P_b 1)_a [N/m].
+  std::vector<Eigen::Vector3d> first;  ///< (P_b (X - C_b))_a [N].
+};
+
+/// Adds the ties' matrices to matrices.tie (P = sum_b P_b) and returns their targets. The tube's radius does
+/// not depend on the active level: at least a quarter of `edge_length` (half a level-1 cell).
+std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
+                          const LimbRadii& radii, const lattice::LeafMesh& mesh,
+                          const std::vector<double>& mu_of_frame, double edge_length,
+                          const TieOptions& options, LeafMatrices& matrices);
+
+}  // namespace sinew::fem

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/SparseCore>
+
+#include "lattice/basis.h"
+
+/// Points embedded in the lattice: where they are and how the basis moves them.
+namespace sinew::lattice {
+
+/// One point per row of the input.
+struct Embedding {
+  std::vector<int> cell;  ///< leaf cell that holds the point, or the nearest one.
+  Points xi;              ///< local coordinates in that cell, num_points x 3 [-].
+  /// Row of the leaf-vertex values: num_points x mesh.num_vertices(), eight weights a row, summing to 1.
+  Eigen::SparseMatrix<double, Eigen::RowMajor> weights;
+  /// Points that lie in no cell (farther than 1e-9 in local coordinates), ascending; they are extrapolated
+  /// from the nearest cell.
+  std::vector<int> outside;
+};
+
+/// Embeds `points` (num_points x 3 [m]) in the leaf cells. Reproduces each point to 1e-12 of the lattice's
+/// size where Newton's method converges. A point on a shared face goes to the cell with the smaller index.
+Embedding embed(const LeafMesh& mesh, const Points& points);
+
+}  // namespace sinew::lattice

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "lattice/basis.h"
+#include "lattice/surface_query.h"
+
+/// How much of each leaf cell is flesh (DESIGN section 4, "Fill").
+namespace sinew::lattice {
+
+/// Share of material round each of the 2x2x2 Gauss points of a leaf cell, in [0, 1]; Gauss point k belongs to
+/// the octant of corner k (VTK's corner order).
+using FillFractions = std::array<double, 8>;
+
+/// 4x4x4 samples per leaf cell, eight in each octant. A sample is material if its winding number exceeds 0.5
+/// or it lies within `shell` [m] of the surface (open sheets have no inside). One entry per leaf cell.
+std::vector<FillFractions> fill_fractions(const LeafMesh& mesh, const SurfaceQuery& skin, double shell);
+
+/// Flags the leaf cells that stay: any fill, or a point embedded in it (`embedded_cells`: cell indices, e.g.
+/// Embedding::cell).
+std::vector<std::uint8_t> filled_cells(const std::vector<FillFractions>& fill,
+                                       const std::vector<int>& embedded_cells);
+
+}  // namespace sinew::lattice
