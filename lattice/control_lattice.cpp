@@ -1,9 +1,10 @@
 #include "lattice/control_lattice.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
+
+#include <Eigen/Geometry>
 
 namespace sinew::lattice {
 namespace {

@@ -1,6 +1,5 @@
 #include "lattice/surface_query.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+
+#include <Eigen/Geometry>
 
 namespace sinew::lattice {
 namespace {

@@ -1,0 +1,264 @@
+#include "lattice/detail/inspection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include <Eigen/Geometry>
+
+#include "lattice/detail/cell_locator.h"
+#include "lattice/detail/segments.h"
+#include "lattice/quality.h"
+
+namespace sinew::lattice::detail {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A point this near a cell (a share of the cell's size) counts as inside: rounding of positions and of the
+/// containment test.
+constexpr double kInsideSlack = 1e-9;
+/// Chain vertices may leave their bone by this share of the lattice's size: (1 - s) a + s b rounds at 1e-16.
+constexpr double kChainTolerance = 1e-12;
+constexpr int kVoxelsAcross = 32;  ///< for the skin's volume.
+
+using Corners = std::array<Vector3d, 3>;
+
+/// Faces that one cell alone has, quadrilaterals split about their mean.
+std::vector<Corners> boundary_triangles(const CellComplex& complex) {
+  struct Face {
+    std::array<int, 4> key, vertices;
+  };
+  std::vector<Face> faces;
+  for (const Cell& cell : complex.cells)
+    for (const std::array<int, 4>& corners : cell_faces(cell.type)) {
+      Face face;
+      for (int k = 0; k < 4; ++k) face.vertices[k] = corners[k] < 0 ? -1 : cell.vertices[corners[k]];
+      face.key = face.vertices;
+      std::sort(face.key.begin(), face.key.end());
+      faces.push_back(face);
+    }
+  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.key < b.key; });
+  std::vector<Corners> triangles;
+  const auto point = [&](int v) -> Vector3d { return complex.points.row(v).transpose(); };
+  for (std::size_t i = 0; i < faces.size();) {
+    std::size_t j = i + 1;
+    while (j < faces.size() && faces[j].key == faces[i].key) ++j;
+    if (j == i + 1) {
+      const std::array<int, 4>& v = faces[i].vertices;
+      if (v[3] < 0) {
+        triangles.push_back({point(v[0]), point(v[1]), point(v[2])});
+      } else {
+        const Vector3d centre = 0.25 * (point(v[0]) + point(v[1]) + point(v[2]) + point(v[3]));
+        for (int k = 0; k < 4; ++k) triangles.push_back({point(v[k]), point(v[(k + 1) % 4]), centre});
+      }
+    }
+    i = j;
+  }
+  return triangles;
+}
+
+/// True where the segment pq passes through the inside of the triangle, by more than `eps` on either side.
+bool crosses(const Vector3d& p, const Vector3d& q, const Corners& t, double eps) {
+  const Vector3d normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+  const double dp = normal.dot(p - t[0]), dq = normal.dot(q - t[0]);
+  if (!((dp > eps && dq < -eps) || (dp < -eps && dq > eps))) return false;
+  const Vector3d x = p + (q - p) * (dp / (dp - dq));
+  for (int k = 0; k < 3; ++k) {
+    const Vector3d edge = t[(k + 1) % 3] - t[k];
+    if (normal.dot(edge.cross(x - t[k])) <= eps * edge.norm()) return false;
+  }
+  return true;
+}
+
+bool triangles_cross(const Corners& a, const Corners& b, double eps) {
+  for (int k = 0; k < 3; ++k)
+    if (crosses(a[k], a[(k + 1) % 3], b, eps) || crosses(b[k], b[(k + 1) % 3], a, eps)) return true;
+  return false;
+}
+
+/// Triangles that meet a boundary face of the lattice, though all their vertices are inside.
+std::vector<int> find_triangles_outside(const CellComplex& complex, const Surface& skin,
+                                        const std::vector<bool>& vertex_outside, double size) {
+  const std::vector<Corners> faces = boundary_triangles(complex);
+  // A sweep along x over both sets: for each skin triangle the faces whose box meets its box.
+  struct Span {
+    double low, high;
+    int face;
+  };
+  std::vector<Span> spans;
+  double longest = 0.0;
+  for (int f = 0; f < static_cast<int>(faces.size()); ++f) {
+    const auto [low, high] = std::minmax({faces[f][0].x(), faces[f][1].x(), faces[f][2].x()});
+    spans.push_back({low, high, f});
+    longest = std::max(longest, high - low);
+  }
+  std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
+  std::vector<int> outside;
+  for (int t = 0; t < skin.triangles.rows(); ++t) {
+    Corners corners;
+    bool vertices_inside = true;
+    for (int k = 0; k < 3; ++k) {
+      corners[k] = skin.points.row(skin.triangles(t, k)).transpose();
+      vertices_inside = vertices_inside && !vertex_outside[skin.triangles(t, k)];
+    }
+    if (!vertices_inside) continue;
+    const Vector3d low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
+    const Vector3d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
+    auto span = std::lower_bound(spans.begin(), spans.end(), low.x() - longest,
+                                 [](const Span& s, double x) { return s.low < x; });
+    for (; span != spans.end() && span->low <= high.x(); ++span) {
+      if (span->high < low.x()) continue;
+      const Corners& f = faces[span->face];
+      if ((f[0].cwiseMin(f[1]).cwiseMin(f[2]).array() > high.array()).any()) continue;
+      if ((f[0].cwiseMax(f[1]).cwiseMax(f[2]).array() < low.array()).any()) continue;
+      if (!triangles_cross(corners, f, kInsideSlack * size)) continue;
+      outside.push_back(t);
+      break;
+    }
+  }
+  return outside;
+}
+
+/// Volume of what is inside the skin [m^3].
+double skin_volume(const UnitSkin& skin) {
+  const Vector3d low = skin.points.colwise().minCoeff();
+  const Vector3d size = skin.points.colwise().maxCoeff().transpose() - low;
+  const Eigen::Vector3i count = (size * kVoxelsAcross).array().ceil().cast<int>().max(1);
+  const Vector3d voxel = size.cwiseQuotient(count.cast<double>());
+  int inside = 0;
+  for (int i = 0; i < count.x(); ++i)
+    for (int j = 0; j < count.y(); ++j)
+      for (int k = 0; k < count.z(); ++k)
+        inside += skin.is_inside(low + voxel.cwiseProduct(Vector3d(i + 0.5, j + 0.5, k + 0.5)));
+  return inside * voxel.prod() * std::pow(skin.scale, 3);
+}
+
+bool is_exact_chain(const ControlLattice& lattice, const LatticeBone& bone,
+                    const std::vector<std::pair<int, int>>& edges, double size) {
+  if (bone.chain.size() < 2) return false;
+  const auto point = [&](int v) -> Vector3d { return lattice.complex.points.row(v).transpose(); };
+  if (point(bone.chain.front()) != bone.rest_start || point(bone.chain.back()) != bone.rest_end) return false;
+  for (std::size_t i = 0; i < bone.chain.size(); ++i) {
+    if (point_segment_distance(point(bone.chain[i]), bone.rest_start, bone.rest_end) > kChainTolerance * size)
+      return false;
+    if (i > 0 && !std::binary_search(edges.begin(), edges.end(),
+                                     std::pair<int, int>(std::minmax(bone.chain[i - 1], bone.chain[i])))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void find_broken_chains(const ControlLattice& lattice, double size, Inspection& out) {
+  std::vector<std::pair<int, int>> edges;
+  for (const Cell& cell : lattice.complex.cells)
+    for (const std::array<int, 2>& e : cell_edges(cell.type))
+      edges.push_back(std::minmax(cell.vertices[e[0]], cell.vertices[e[1]]));
+  std::sort(edges.begin(), edges.end());
+  for (const LatticeBone& bone : lattice.bones)
+    if (!bone.soft && !is_exact_chain(lattice, bone, edges, size)) out.broken_chains.push_back(bone.name);
+  out.quality.exact_chains = out.broken_chains.empty();
+}
+
+void find_floating(const ControlLattice& lattice, const CellLocator& locator, Inspection& out) {
+  const std::vector<std::vector<int>> parts = components(lattice.complex);
+  std::vector<bool> vertex_held(lattice.complex.points.rows(), false);
+  std::vector<bool> cell_held(lattice.complex.cells.size(), false);
+  for (const LatticeBone& bone : lattice.bones) {
+    for (int v : bone.chain) vertex_held[v] = true;
+    if (!bone.soft) continue;
+    for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+      const int cell = locator.find((1.0 - s) * bone.rest_start + s * bone.rest_end, kInsideSlack);
+      if (cell >= 0) cell_held[cell] = true;
+    }
+  }
+  for (const SoftFrame& frame : lattice.soft_frames) {
+    const int cell = locator.find(frame.position, kInsideSlack);
+    if (cell >= 0) cell_held[cell] = true;
+  }
+  out.quality.components = static_cast<int>(parts.size());
+  for (const std::vector<int>& part : parts) {
+    const bool held = std::any_of(part.begin(), part.end(), [&](int c) {
+      const Cell& cell = lattice.complex.cells[c];
+      return cell_held[c] ||
+             std::any_of(cell.vertices.begin(), cell.vertices.begin() + num_corners(cell.type),
+                         [&](int v) { return vertex_held[v]; });
+    });
+    if (!held) out.floating.push_back(part);
+  }
+  out.quality.components_without_bone = static_cast<int>(out.floating.size());
+}
+
+void measure_cells(const CellComplex& complex, Inspection& out) {
+  LatticeQuality& q = out.quality;
+  q.min_dihedral_degrees = 180.0;
+  q.min_scaled_jacobian = 1.0;
+  q.min_volume = std::numeric_limits<double>::infinity();
+  for (int c = 0; c < static_cast<int>(complex.cells.size()); ++c) {
+    const double dihedral = min_dihedral_degrees(complex, complex.cells[c]);
+    const double jacobian = min_scaled_jacobian(complex, complex.cells[c]);
+    const double volume = cell_volume(complex, complex.cells[c]);
+    if (!(volume > 0.0)) out.inverted_cells.push_back(c);
+    if (dihedral < q.min_dihedral_degrees) q.min_dihedral_degrees = dihedral, out.flattest_cell = c;
+    if (jacobian < q.min_scaled_jacobian) q.min_scaled_jacobian = jacobian, out.most_skewed_cell = c;
+    q.min_volume = std::min(q.min_volume, volume);
+    q.volume_ratio += volume;
+  }
+}
+
+}  // namespace
+
+std::vector<std::vector<int>> components(const CellComplex& complex) {
+  std::vector<int> parent(complex.points.rows());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (const Cell& cell : complex.cells)
+    for (int k = 1; k < num_corners(cell.type); ++k) {
+      const int a = root(cell.vertices[0]), b = root(cell.vertices[k]);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  std::vector<int> number(complex.points.rows(), -1);
+  std::vector<std::vector<int>> parts;
+  for (int c = 0; c < static_cast<int>(complex.cells.size()); ++c) {
+    const int r = root(complex.cells[c].vertices[0]);
+    if (number[r] < 0) {
+      number[r] = static_cast<int>(parts.size());
+      parts.emplace_back();
+    }
+    parts[number[r]].push_back(c);
+  }
+  return parts;
+}
+
+Inspection inspect(const ControlLattice& lattice, const Surface& skin, const UnitSkin& unit) {
+  const CellComplex& complex = lattice.complex;
+  if (complex.cells.empty()) throw std::invalid_argument("lattice: there is no cell");
+  const double size = (complex.points.colwise().maxCoeff() - complex.points.colwise().minCoeff()).maxCoeff();
+  Inspection out;
+  measure_cells(complex, out);
+  const double volume = skin_volume(unit);
+  out.quality.volume_ratio =
+      volume > 0.0 ? out.quality.volume_ratio / volume : std::numeric_limits<double>::infinity();
+
+  const CellLocator locator(complex);
+  std::vector<bool> vertex_outside(skin.points.rows(), false);
+  for (int v = 0; v < skin.points.rows(); ++v) {
+    if (locator.find(skin.points.row(v).transpose(), kInsideSlack) >= 0) continue;
+    vertex_outside[v] = true;
+    out.vertices_outside.push_back(v);
+  }
+  out.quality.skin_vertices_outside = static_cast<int>(out.vertices_outside.size());
+  out.triangles_outside = find_triangles_outside(complex, skin, vertex_outside, size);
+  out.quality.skin_triangles_outside = static_cast<int>(out.triangles_outside.size());
+  find_broken_chains(lattice, size, out);
+  find_floating(lattice, locator, out);
+  return out;
+}
+
+}  // namespace sinew::lattice::detail

@@ -1,0 +1,95 @@
+#include "lattice/detail/lattice_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lattice/detail/segments.h"
+
+namespace sinew::lattice::detail {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kBoneSpacing = 1.1;  ///< of bone samples, in units of h.
+/// Grid points farther from the skin than this are in no cell that touches it: the longest edge of a cell of
+/// the body-centred grid is 1.155 h.
+constexpr double kGridReach = 1.2;
+/// Half the length of a bone piece, and a little more for rounding.
+constexpr double kMiddleBall = 0.51;
+
+void place_bones(const ReducedSkeleton& skeleton, double h, LatticePoints& out) {
+  std::vector<int> vertex_of_node(skeleton.nodes.size(), -1);
+  for (const ReducedBone& bone : skeleton.bones) {
+    if (bone.soft) continue;
+    for (int node : {bone.start, bone.end})
+      if (vertex_of_node[node] < 0)
+        vertex_of_node[node] = out.add(skeleton.nodes[node].position, {.bone = -1, .s = 0.0, .fixed = true});
+  }
+  out.chains.resize(skeleton.bones.size());
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    const ReducedBone& bone = skeleton.bones[b];
+    if (bone.soft) continue;
+    const double length = (skeleton.nodes[bone.end].position - skeleton.nodes[bone.start].position).norm();
+    const int pieces = std::max(1, static_cast<int>(std::lround(length / (kBoneSpacing * h))));
+    out.chains[b].push_back(vertex_of_node[bone.start]);
+    for (int i = 1; i < pieces; ++i) {
+      const double s = static_cast<double>(i) / pieces;
+      out.chains[b].push_back(out.add(point_on_bone(skeleton, b, s), {.bone = b, .s = s, .fixed = false}));
+    }
+    out.chains[b].push_back(vertex_of_node[bone.end]);
+  }
+}
+
+}  // namespace
+
+Vector3d point_on_bone(const ReducedSkeleton& skeleton, int bone, double s) {
+  const ReducedBone& b = skeleton.bones[bone];
+  return (1.0 - s) * skeleton.nodes[b.start].position + s * skeleton.nodes[b.end].position;
+}
+
+BoneClearance::BoneClearance(const LatticePoints& points, double h, const PointOptions& options) {
+  for (const std::vector<int>& chain : points.chains)
+    for (std::size_t i = 1; i < chain.size(); ++i) {
+      const Vector3d a = points.points[chain[i - 1]], b = points.points[chain[i]];
+      const double length = (b - a).norm();
+      pieces_.push_back(
+          {a, b, options.exclusion * std::min(h, std::max(length, 0.5 * h)), kMiddleBall * length});
+    }
+}
+
+bool BoneClearance::is_too_close(const Vector3d& p) const {
+  return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) {
+    return (p - 0.5 * (piece.a + piece.b)).squaredNorm() < piece.middle_radius * piece.middle_radius ||
+           point_segment_distance(p, piece.a, piece.b) < piece.radius;
+  });
+}
+
+double BoneClearance::distance(const Vector3d& p) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Piece& piece : pieces_) nearest = std::min(nearest, point_segment_distance(p, piece.a, piece.b));
+  return nearest;
+}
+
+LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton, double h,
+                           const PointOptions& options) {
+  LatticePoints out;
+  place_bones(skeleton, h, out);
+  const BoneClearance clearance(out, h, options);
+  // Cubes of side 2h/sqrt(3) with a point in the middle: neighbours along a diagonal are h apart.
+  const double side = 2.0 * h / std::sqrt(3.0);
+  const Vector3d reach = skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() + kGridReach * h;
+  const Eigen::Vector3i count = (2.0 * reach / side).array().ceil().cast<int>();
+  for (int i = -count.x(); i <= count.x(); ++i)
+    for (int j = -count.y(); j <= count.y(); ++j)
+      for (int k = -count.z(); k <= count.z(); ++k) {
+        if ((i - j) % 2 != 0 || (j - k) % 2 != 0) continue;  // all even or all odd
+        const Vector3d p = 0.5 * side * Vector3d(i, j, k);
+        if ((p.cwiseAbs().array() > reach.array()).any()) continue;
+        if (!skin.query.is_within(p, kGridReach * h) && !skin.is_inside(p)) continue;
+        if (!clearance.is_too_close(p)) out.add(p, {});
+      }
+  return out;
+}
+
+}  // namespace sinew::lattice::detail

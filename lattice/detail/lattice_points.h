@@ -1,0 +1,60 @@
+#pragma once
+
+#include <vector>
+
+#include "lattice/detail/skeleton_reduction.h"
+#include "lattice/detail/unit_skin.h"
+
+namespace sinew::lattice::detail {
+
+/// The vertices of a lattice to be, unit coordinates (LATTICE step 5).
+struct LatticePoints {
+  /// Where a vertex may go.
+  struct Place {
+    int bone = -1;       ///< the hard bone it lies on; -1 for free vertices and joints.
+    double s = 0.0;      ///< parameter along that bone, in (0, 1).
+    bool fixed = false;  ///< a joint: it stays.
+  };
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Place> places;  ///< one per point.
+  /// Per bone of the reduced skeleton its vertices from start to end; empty for soft bones.
+  std::vector<std::vector<int>> chains;
+
+  int add(const Eigen::Vector3d& p, const Place& place) {
+    points.push_back(p);
+    places.push_back(place);
+    return static_cast<int>(points.size()) - 1;
+  }
+};
+
+/// The point at parameter s of a bone, (1 - s) a + s b.
+Eigen::Vector3d point_on_bone(const ReducedSkeleton& skeleton, int bone, double s);
+
+/// How free points keep away from the bones.
+struct PointOptions {
+  double exclusion = 0.62;  ///< in units of min(h, max(l, h/2)), l the length of the bone piece.
+};
+
+/// True where a free point would come too close to a piece of some bone: the ball about the middle of each
+/// piece stays empty, so that the piece is a Delaunay edge.
+class BoneClearance {
+ public:
+  BoneClearance(const LatticePoints& points, double h, const PointOptions& options);
+  bool is_too_close(const Eigen::Vector3d& p) const;
+  double distance(const Eigen::Vector3d& p) const;  ///< to the nearest bone piece; infinite without bones.
+
+ private:
+  struct Piece {
+    Eigen::Vector3d a, b;
+    double radius;         ///< about the piece.
+    double middle_radius;  ///< about its midpoint.
+  };
+  std::vector<Piece> pieces_;
+};
+
+/// Joints, bone samples every 1.1 h, and a body-centred cubic grid of nearest distance h, symmetric about the
+/// centre of the skin's box, inside the skin and within 1.2 h of it.
+LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton, double h,
+                           const PointOptions& options);
+
+}  // namespace sinew::lattice::detail

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lattice/control_lattice.h"
+#include "lattice/detail/unit_skin.h"
+
+namespace sinew::lattice::detail {
+
+/// Thresholds of LATTICE step 4; lengths in units of h.
+struct ReductionOptions {
+  double smallest_bone = 0.5;   ///< shorter bones are contracted.
+  double cut_distance = 0.25;   ///< a bone farther than this outside the skin may be cut.
+  double cut_length = 0.5;      ///< so long a bone may be cut.
+  double chain_degrees = 15.0;  ///< siblings within this angle are chained.
+  double too_close = 0.15;      ///< bones nearer than this cannot both be edges.
+};
+
+/// A point of the reduced skeleton: several joints may share it after contraction.
+struct SkeletonNode {
+  int joint = -1;                     ///< the joint that carries it.
+  Eigen::Vector3d position{0, 0, 0};  ///< unit coordinates.
+};
+
+/// A straight piece of the reduced skeleton between two nodes.
+struct ReducedBone {
+  std::string name;
+  int frame = -1;  ///< joint.
+  int start = -1;  ///< node.
+  int end = -1;    ///< node.
+  bool tip = false;
+  bool soft = false;
+};
+
+/// The skeleton at size h.
+struct ReducedSkeleton {
+  std::vector<SkeletonNode> nodes;
+  std::vector<ReducedBone> bones;
+  std::vector<SoftFrame> soft_frames;  ///< positions in unit coordinates.
+  std::vector<SkeletonChange> changes;
+};
+
+/// How the skin hangs on the joints; independent of h.
+struct JointWeights {
+  std::vector<double> area;          ///< skin area (unit coordinates) times weight of each joint.
+  std::vector<double> subtree_area;  ///< the same with all descendants.
+  /// Vertices of each joint with their weights.
+  std::vector<std::vector<std::pair<int, double>>> vertices;
+};
+JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints);
+
+/// Reduces the joint tree at target edge `h` (unit coordinates, like the positions of `joints`).
+ReducedSkeleton reduce_skeleton(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights,
+                                double h, const ReductionOptions& options);
+
+/// For every joint the frame its weight counts for: itself if it owns a bone or a soft frame, else the
+/// nearest ancestor that does, else the nearest descendant, else the first frame there is; -1 where there is
+/// none.
+std::vector<int> frame_of_joint(const std::vector<int>& parents, const std::vector<int>& frames);
+
+}  // namespace sinew::lattice::detail

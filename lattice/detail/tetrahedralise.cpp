@@ -1,0 +1,156 @@
+#include "lattice/detail/tetrahedralise.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <CGAL/Delaunay_triangulation_3.h>
+#include <CGAL/Delaunay_triangulation_cell_base_3.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Triangulation_cell_base_with_info_3.h>
+#include <CGAL/Triangulation_vertex_base_with_info_3.h>
+
+namespace sinew::lattice::detail {
+namespace {
+
+using Eigen::Vector3d;
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_3<int, Kernel>;
+using CellBase =
+    CGAL::Triangulation_cell_base_with_info_3<bool, Kernel, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>;
+using Delaunay =
+    CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
+
+constexpr int kSplitRounds = 8;
+constexpr int kRelaxRounds = 4;
+constexpr double kRelaxReach = 2.0;  ///< free points this near a bone are relaxed, in units of h.
+
+Kernel::Point_3 to_cgal(const Vector3d& p) { return {p.x(), p.y(), p.z()}; }
+
+/// The triangulation of some points together with the handle of each.
+struct Triangulation {
+  Delaunay delaunay;
+  std::vector<Delaunay::Vertex_handle> handles;
+
+  explicit Triangulation(const std::vector<Vector3d>& points) {
+    std::vector<std::pair<Kernel::Point_3, int>> list;
+    list.reserve(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+      list.emplace_back(to_cgal(points[i]), static_cast<int>(i));
+    delaunay.insert(list.begin(), list.end());
+    handles.resize(points.size());
+    for (auto v = delaunay.finite_vertices_begin(); v != delaunay.finite_vertices_end(); ++v)
+      handles[v->info()] = v;
+  }
+  bool has_edge(int a, int b) const {
+    Delaunay::Cell_handle cell;
+    int i = 0, j = 0;
+    return handles[a] != Delaunay::Vertex_handle() && handles[b] != Delaunay::Vertex_handle() &&
+           delaunay.is_edge(handles[a], handles[b], cell, i, j);
+  }
+};
+
+/// Moves free points near the bones half-way to the mean of their neighbours, so that the grid gives way.
+void relax(LatticePoints& points, const Triangulation& triangulation, double h, const PointOptions& options) {
+  const BoneClearance clearance(points, h, options);
+  const Delaunay& delaunay = triangulation.delaunay;
+  std::vector<Vector3d> moved = points.points;
+  std::vector<Delaunay::Vertex_handle> neighbours;
+  for (std::size_t i = 0; i < points.points.size(); ++i) {
+    const LatticePoints::Place& place = points.places[i];
+    if (place.fixed || place.bone >= 0 || clearance.distance(points.points[i]) > kRelaxReach * h) continue;
+    neighbours.clear();
+    delaunay.adjacent_vertices(triangulation.handles[i], std::back_inserter(neighbours));
+    Vector3d mean = Vector3d::Zero();
+    bool on_hull = false;
+    for (const Delaunay::Vertex_handle& v : neighbours) {
+      on_hull = on_hull || delaunay.is_infinite(v);
+      if (!on_hull) mean += points.points[v->info()] / static_cast<double>(neighbours.size());
+    }
+    if (on_hull) continue;
+    const Vector3d target = 0.5 * (points.points[i] + mean);
+    if (!clearance.is_too_close(target)) moved[i] = target;
+  }
+  points.points = std::move(moved);
+}
+
+/// Splits every missing piece of every bone once; the number of splits.
+int split_missing_pieces(LatticePoints& points, const ReducedSkeleton& skeleton,
+                         const Triangulation& triangulation) {
+  int splits = 0;
+  for (int b = 0; b < static_cast<int>(points.chains.size()); ++b) {
+    std::vector<int> chain;
+    const auto parameter = [&](int vertex, double at_end) {
+      return points.places[vertex].fixed ? at_end : points.places[vertex].s;
+    };
+    const std::vector<int> old = points.chains[b];
+    for (std::size_t i = 0; i < old.size(); ++i) {
+      if (i > 0 && !triangulation.has_edge(old[i - 1], old[i])) {
+        const double s = 0.5 * (parameter(old[i - 1], 0.0) + parameter(old[i], 1.0));
+        chain.push_back(points.add(point_on_bone(skeleton, b, s), {.bone = b, .s = s, .fixed = false}));
+        ++splits;
+      }
+      chain.push_back(old[i]);
+    }
+    points.chains[b] = std::move(chain);
+  }
+  return splits;
+}
+
+std::vector<int> unfinished_bones(const LatticePoints& points, const Triangulation& triangulation) {
+  std::vector<int> bones;
+  for (int b = 0; b < static_cast<int>(points.chains.size()); ++b)
+    for (std::size_t i = 1; i < points.chains[b].size(); ++i)
+      if (!triangulation.has_edge(points.chains[b][i - 1], points.chains[b][i])) {
+        bones.push_back(b);
+        break;
+      }
+  return bones;
+}
+
+/// The cells that hold a sample or an edge of a bone.
+Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const SkinSamples& samples) {
+  Delaunay& delaunay = triangulation.delaunay;
+  for (auto c = delaunay.all_cells_begin(); c != delaunay.all_cells_end(); ++c) c->info() = false;
+  Delaunay::Cell_handle hint;
+  for (const Vector3d& p : samples.points) {
+    hint = delaunay.locate(to_cgal(p), hint);
+    hint->info() = true;
+  }
+  for (const std::vector<int>& chain : points.chains)
+    for (std::size_t i = 1; i < chain.size(); ++i) {
+      Delaunay::Cell_handle cell;
+      int a = 0, b = 0;
+      if (!delaunay.is_edge(triangulation.handles[chain[i - 1]], triangulation.handles[chain[i]], cell, a, b))
+        continue;
+      Delaunay::Cell_circulator circulator = delaunay.incident_cells(cell, a, b), first = circulator;
+      do {
+        circulator->info() = true;
+      } while (++circulator != first);
+    }
+  Tetrahedra cells;
+  for (auto c = delaunay.finite_cells_begin(); c != delaunay.finite_cells_end(); ++c)
+    if (c->info())
+      cells.push_back(
+          {c->vertex(0)->info(), c->vertex(1)->info(), c->vertex(2)->info(), c->vertex(3)->info()});
+  return cells;
+}
+
+}  // namespace
+
+TetrahedraResult tetrahedralise(LatticePoints& points, const ReducedSkeleton& skeleton,
+                                const SkinSamples& samples, double h, const PointOptions& options) {
+  TetrahedraResult result;
+  for (int round = 0; round < kRelaxRounds; ++round) relax(points, Triangulation(points.points), h, options);
+  for (int round = 0; round < kSplitRounds; ++round) {
+    const int splits = split_missing_pieces(points, skeleton, Triangulation(points.points));
+    result.splits += splits;
+    if (splits == 0) break;
+  }
+  Triangulation triangulation(points.points);
+  result.unfinished = unfinished_bones(points, triangulation);
+  result.cells = cull(points, triangulation, samples);
+  return result;
+}
+
+}  // namespace sinew::lattice::detail

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <vector>
+
+#include "lattice/surface.h"
+#include "lattice/surface_query.h"
+
+namespace sinew::lattice::detail {
+
+/// The skin as the builder sees it (LATTICE step 1): centred on its bounding box, longest side of the box 1,
+/// welded, without degenerate and doubled triangles, every component turned outward.
+struct UnitSkin {
+  Eigen::Vector3d centre{0, 0, 0};              ///< of the bounding box [m].
+  double scale = 1.0;                           ///< longest side of the bounding box [m].
+  Points points;                                ///< welded, unit coordinates.
+  Triangles triangles;                          ///< at least one.
+  std::vector<std::vector<Influence>> weights;  ///< per welded point.
+  std::vector<Eigen::Vector3d> normals;  ///< per welded point, area weighted; zero where no triangle is.
+  std::vector<double> areas;             ///< a third of the triangles round each welded point.
+  SurfaceQuery query;
+
+  Eigen::Vector3d to_unit(const Eigen::Vector3d& p) const { return (p - centre) / scale; }
+  Eigen::Vector3d to_rest(const Eigen::Vector3d& p) const { return centre + scale * p; }
+  bool is_inside(const Eigen::Vector3d& p) const { return query.winding_number(p) > 0.5; }
+};
+
+/// Throws std::invalid_argument where no triangle with an area is left or a coordinate is not finite.
+UnitSkin make_unit_skin(const Surface& skin);
+
+}  // namespace sinew::lattice::detail
