@@ -1,0 +1,204 @@
+#!/usr/bin/env python3
+"""Rules of the tree that no compiler checks. Usage: check_tree.py ROOT RULE; prints every offence, exits 1 if any."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+SKIPPED = 77  # ctest: the rule could not be checked here
+
+FOLDERS = ["lattice", "skeleton", "fem", "adapt", "assets", "tools", "tests"]
+TOP_LEVEL = set(FOLDERS) | {"LICENSE", "CHANGELOG.md", "README.md", "CMakeLists.txt", "CMakePresets.json"}
+
+# Who may include whom, besides itself.
+MAY_INCLUDE = {
+    "lattice": set(),
+    "skeleton": set(),
+    "fem": {"lattice", "skeleton"},
+    "adapt": {"lattice", "fem"},
+    "assets": {"lattice", "skeleton"},
+    "tools": {"lattice", "skeleton", "fem", "adapt", "assets"},
+    "tests": set(FOLDERS),
+}
+
+# Headers of other libraries (a prefix) and the folders that may see them; tests may see all.
+LIBRARIES = {
+    "Eigen/": {"lattice", "skeleton", "fem", "adapt", "assets", "tools"},
+    "unsupported/Eigen/": {"lattice", "skeleton", "fem", "adapt", "assets", "tools"},
+    "tbb/": {"lattice", "fem", "adapt", "assets", "tools"},
+    "oneapi/tbb": {"lattice", "fem", "adapt", "assets", "tools"},
+    "fmt/": {"lattice", "skeleton", "fem", "adapt", "assets", "tools"},
+    "CGAL/": {"lattice"},
+    "nanoflann.hpp": {"lattice", "fem", "assets"},
+    "cholmod": {"fem"},
+    "embree3/": {"lattice", "assets"},
+    "assimp/": {"assets"},
+    "tiny_gltf.h": {"assets"},
+    "urdf": {"assets"},
+    "png.h": {"assets"},
+    "zlib.h": {"assets"},
+    "nlohmann/": {"assets", "tools"},
+    "CLI/": {"tools"},
+    "toml++/": {"tools"},
+}
+# What a public header of a library may show besides the standard library.
+PUBLIC_LIBRARIES = ("Eigen/",)
+FOREIGN_NAMES = re.compile(r"\b(cholmod_\w+|Assimp::|ai(Scene|Node|Mesh|Bone)\b|tinygltf::|urdf::|CGAL::|RTC\w+|tbb::)")
+
+SYSTEM_HEADER = re.compile(
+    r"((sys|linux|netinet|arpa)/\w+|unistd|fcntl|signal|dlfcn|poll|pthread|spawn|sched|errno|ftw|dirent|fenv|malloc|execinfo)\.h$")
+STANDARD_HEADER = re.compile(r"[a-z_0-9]+$")
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+# No paths of one machine, nothing left for later, no test that is switched off.
+WORDS = {
+    re.compile(r"(?<![\w.}])/(?:home|root|work|tmp|mnt|Users)/"): "a path of one machine",
+    re.compile(r"\b(?:TO" r"DO|FIX" r"ME|XX" r"X)\b"): "work left for later",
+    re.compile(r"\bGTEST_" r"SKIP\b|\bDISA" r"BLED_"): "a test that is switched off",
+}
+
+MAX_LINES = 600
+MAX_FILE_BYTES = 1_000_000
+MAX_SAMPLE_BYTES = 3_000_000
+
+
+def tracked_files(root):
+    """Paths of the tree relative to root: what git knows or would add; without git everything but build output."""
+    listing = subprocess.run(
+        ["git", "-C", root, "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False) if shutil.which("git") else None
+    if listing is not None and listing.returncode == 0:
+        names = {name for name in listing.stdout.decode().split("\0") if name}
+        return sorted(name for name in names if os.path.exists(os.path.join(root, name)))
+    files = []
+    for folder, subfolders, names in os.walk(root):
+        if folder == root:
+            subfolders[:] = [s for s in subfolders if s != ".git" and not s.startswith(("build", "out"))]
+        files += [os.path.relpath(os.path.join(folder, name), root) for name in names]
+    return sorted(files)
+
+
+def read(root, name):
+    with open(os.path.join(root, name), encoding="utf-8", errors="replace") as stream:
+        return stream.read()
+
+
+def sources(root):
+    return [name for name in tracked_files(root) if name.endswith((".h", ".cpp"))]
+
+
+def is_public_header(name):
+    return name.endswith(".h") and name.split("/")[0] in FOLDERS[:5] and "/detail/" not in name
+
+
+def check_layout(root):
+    for name in tracked_files(root):
+        top = name.split("/")[0]
+        if top not in TOP_LEVEL and not top.startswith("."):
+            yield f"{name}: the top level holds {', '.join(sorted(TOP_LEVEL))} only"
+
+
+def check_own_include(root, name, line, included):
+    folder, target = name.split("/")[0], included.split("/")[0]
+    if target not in FOLDERS or not os.path.exists(os.path.join(root, included)):
+        yield f"{name}:{line}: \"{included}\": includes start at the root of the tree"
+    elif target != folder and target not in MAY_INCLUDE[folder]:
+        allowed = ", ".join(sorted(MAY_INCLUDE[folder])) or "nobody else"
+        yield f"{name}:{line}: \"{included}\": {folder} may include {allowed}"
+    elif "/detail/" in included and target != folder and folder != "tests":
+        yield f"{name}:{line}: \"{included}\": internals of {target}"
+
+
+def check_library_include(root, name, line, included):
+    folder = name.split("/")[0]
+    if STANDARD_HEADER.match(included) or SYSTEM_HEADER.match(included):
+        return
+    if is_public_header(name) and not included.startswith(PUBLIC_LIBRARIES):
+        yield f"{name}:{line}: <{included}>: a public header shows no library but Eigen"
+    if folder == "tests":
+        return
+    folders = next((f for prefix, f in LIBRARIES.items() if included.startswith(prefix)), set())
+    if folder not in folders:
+        allowed = ", ".join(sorted(folders)) or "nobody (tests/checks/check_tree.py has the list)"
+        yield f"{name}:{line}: <{included}>: this library belongs to {allowed}"
+
+
+def check_includes(root):
+    for name in sources(root):
+        text = read(root, name)
+        for line, content in enumerate(text.splitlines(), 1):
+            match = INCLUDE.match(content)
+            if not match:
+                continue
+            check = check_own_include if match.group(1) == '"' else check_library_include
+            yield from check(root, name, line, match.group(2))
+        if name.endswith(".h") and not re.search(r"^#pragma once$", text, re.MULTILINE):
+            yield f"{name}: no #pragma once"
+        if is_public_header(name) and FOREIGN_NAMES.search(text):
+            yield f"{name}: {FOREIGN_NAMES.search(text).group(0)}: a public header shows no library but Eigen"
+
+
+def check_words(root):
+    for name in tracked_files(root):
+        if name == "LICENSE" or not is_text(os.path.join(root, name)):
+            continue
+        for line, content in enumerate(read(root, name).splitlines(), 1):
+            for pattern, what in WORDS.items():
+                found = pattern.search(content)
+                if found:
+                    yield f"{name}:{line}: '{found.group(0)}': {what}"
+
+
+def is_text(path):
+    with open(path, "rb") as stream:
+        return b"\0" not in stream.read(8192)
+
+
+def check_sizes(root):
+    samples = 0
+    for name in tracked_files(root):
+        size = os.path.getsize(os.path.join(root, name))
+        if size > MAX_FILE_BYTES:
+            yield f"{name}: {size} bytes, expected at most {MAX_FILE_BYTES}"
+        if name.startswith("assets/samples/"):
+            samples += size
+        if name.endswith((".h", ".cpp")):
+            lines = read(root, name).count("\n")
+            if lines > MAX_LINES:
+                yield f"{name}: {lines} lines, expected at most {MAX_LINES}: is it one thing?"
+    if samples > MAX_SAMPLE_BYTES:
+        yield f"assets/samples: {samples} bytes in all, expected at most {MAX_SAMPLE_BYTES}"
+
+
+def check_format(root):
+    tool = next((t for t in ("clang-format-14", "clang-format") if shutil.which(t)), None)
+    version = subprocess.run([tool, "--version"], capture_output=True, text=True, check=True).stdout if tool else ""
+    if "version 14." not in version:
+        print("skipped: clang-format 14 is not installed (Debian package clang-format-14)")
+        sys.exit(SKIPPED)
+    names = sources(root)
+    if not names:
+        return
+    report = subprocess.run([tool, "--dry-run", "--style=file", *names], cwd=root, capture_output=True, text=True,
+                            check=False)
+    for name in sorted(set(re.findall(r"^(\S+?):\d+:\d+: (?:warning|error):", report.stderr, re.MULTILINE))):
+        yield f"{name}: not formatted; run {tool} -i {name}"
+
+
+RULES = {"layout": check_layout, "includes": check_includes, "words": check_words, "sizes": check_sizes,
+         "format": check_format}
+
+
+def main():
+    if len(sys.argv) != 3 or sys.argv[2] not in RULES:
+        print(f"usage: check_tree.py ROOT {'|'.join(RULES)}", file=sys.stderr)
+        return 2
+    offences = list(RULES[sys.argv[2]](sys.argv[1]))
+    print("\n".join(offences) if offences else f"{sys.argv[2]}: nothing to complain about")
+    return 1 if offences else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
