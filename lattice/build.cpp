@@ -61,10 +61,8 @@ struct Context {
   JointWeights weights;
 };
 
-Draft make_draft(const Context& context, double h, const Attempt& attempt, Density density,
-                 SkinSamples& samples) {
+Draft make_draft(const Context& context, double h, const Attempt& attempt, const SkinSamples& samples) {
   Draft draft;
-  samples = sample_skin(context.skin, h, density);
   draft.skeleton = reduce_skeleton(context.skin, context.joints, context.weights, h, attempt.reduction);
   draft.points = place_points(context.skin, draft.skeleton, h, attempt.points);
   draft.cells = tetrahedralise(draft.points, draft.skeleton, samples, h, attempt.points).cells;
@@ -77,8 +75,8 @@ double find_edge_length(const Context& context, int wanted) {
   double x = std::log(0.1), best_x = x, best_error = std::numeric_limits<double>::infinity();
   double old_x = 0.0, old_y = 0.0, slope = -2.3;  // cells go like h^-3 in a bulk, h^-2 in a skin
   for (int step = 0; step < kSearchSteps; ++step) {
-    SkinSamples samples;
-    const Draft draft = make_draft(context, std::exp(x), {}, Density::Draft, samples);
+    const double h = std::exp(x);
+    const Draft draft = make_draft(context, h, {}, sample_skin(context.skin, h));
     const double y = std::log(static_cast<double>(std::max<std::size_t>(1, draft.cells.size())));
     if (std::abs(y - target) < best_error) best_error = std::abs(y - target), best_x = x;
     if (best_error < kCloseEnough) break;
@@ -238,8 +236,8 @@ Context make_context(const Surface& skin, const JointTree& joints) {
 
 ControlLattice make_attempt(const Context& context, const Surface& skin, const JointTree& joints, double h,
                             const Attempt& attempt) {
-  SkinSamples samples;
-  Draft draft = make_draft(context, h, attempt, Density::Full, samples);
+  const SkinSamples samples = sample_skin(context.skin, h);
+  Draft draft = make_draft(context, h, attempt, samples);
   optimise(draft.points, draft.cells, draft.skeleton, context.skin, samples, h);
   ControlLattice lattice = finish(context, joints, draft, h);
   tie_floating_components(context, joints, skin, lattice);

@@ -10,6 +10,7 @@
 
 #include "lattice/detail/cell_locator.h"
 #include "lattice/detail/segments.h"
+#include "lattice/detail/triangle_grid.h"
 #include "lattice/quality.h"
 
 namespace sinew::lattice::detail {
@@ -24,10 +25,8 @@ constexpr double kInsideSlack = 1e-9;
 constexpr double kChainTolerance = 1e-12;
 constexpr int kVoxelsAcross = 32;  ///< for the skin's volume.
 
-using Corners = std::array<Vector3d, 3>;
-
 /// Faces that one cell alone has, quadrilaterals split about their mean.
-std::vector<Corners> boundary_triangles(const CellComplex& complex) {
+std::vector<TriangleCorners> boundary_triangles(const CellComplex& complex) {
   struct Face {
     std::array<int, 4> key, vertices;
   };
@@ -41,7 +40,7 @@ std::vector<Corners> boundary_triangles(const CellComplex& complex) {
       faces.push_back(face);
     }
   std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.key < b.key; });
-  std::vector<Corners> triangles;
+  std::vector<TriangleCorners> triangles;
   const auto point = [&](int v) -> Vector3d { return complex.points.row(v).transpose(); };
   for (std::size_t i = 0; i < faces.size();) {
     std::size_t j = i + 1;
@@ -60,64 +59,20 @@ std::vector<Corners> boundary_triangles(const CellComplex& complex) {
   return triangles;
 }
 
-/// True where the segment pq passes through the inside of the triangle, by more than `eps` on either side.
-bool crosses(const Vector3d& p, const Vector3d& q, const Corners& t, double eps) {
-  const Vector3d normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
-  const double dp = normal.dot(p - t[0]), dq = normal.dot(q - t[0]);
-  if (!((dp > eps && dq < -eps) || (dp < -eps && dq > eps))) return false;
-  const Vector3d x = p + (q - p) * (dp / (dp - dq));
-  for (int k = 0; k < 3; ++k) {
-    const Vector3d edge = t[(k + 1) % 3] - t[k];
-    if (normal.dot(edge.cross(x - t[k])) <= eps * edge.norm()) return false;
-  }
-  return true;
-}
-
-bool triangles_cross(const Corners& a, const Corners& b, double eps) {
-  for (int k = 0; k < 3; ++k)
-    if (crosses(a[k], a[(k + 1) % 3], b, eps) || crosses(b[k], b[(k + 1) % 3], a, eps)) return true;
-  return false;
-}
-
-/// Triangles that meet a boundary face of the lattice, though all their vertices are inside.
+/// Triangles that cross a boundary face of the lattice, though all their vertices are inside.
 std::vector<int> find_triangles_outside(const CellComplex& complex, const Surface& skin,
                                         const std::vector<bool>& vertex_outside, double size) {
-  const std::vector<Corners> faces = boundary_triangles(complex);
-  // A sweep along x over both sets: for each skin triangle the faces whose box meets its box.
-  struct Span {
-    double low, high;
-    int face;
-  };
-  std::vector<Span> spans;
-  double longest = 0.0;
-  for (int f = 0; f < static_cast<int>(faces.size()); ++f) {
-    const auto [low, high] = std::minmax({faces[f][0].x(), faces[f][1].x(), faces[f][2].x()});
-    spans.push_back({low, high, f});
-    longest = std::max(longest, high - low);
-  }
-  std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.low < b.low; });
+  const double side = size / std::cbrt(static_cast<double>(complex.cells.size()));
+  const TriangleGrid boundary(boundary_triangles(complex), side);
   std::vector<int> outside;
   for (int t = 0; t < skin.triangles.rows(); ++t) {
-    Corners corners;
+    TriangleCorners corners;
     bool vertices_inside = true;
     for (int k = 0; k < 3; ++k) {
       corners[k] = skin.points.row(skin.triangles(t, k)).transpose();
       vertices_inside = vertices_inside && !vertex_outside[skin.triangles(t, k)];
     }
-    if (!vertices_inside) continue;
-    const Vector3d low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
-    const Vector3d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
-    auto span = std::lower_bound(spans.begin(), spans.end(), low.x() - longest,
-                                 [](const Span& s, double x) { return s.low < x; });
-    for (; span != spans.end() && span->low <= high.x(); ++span) {
-      if (span->high < low.x()) continue;
-      const Corners& f = faces[span->face];
-      if ((f[0].cwiseMin(f[1]).cwiseMin(f[2]).array() > high.array()).any()) continue;
-      if ((f[0].cwiseMax(f[1]).cwiseMax(f[2]).array() < low.array()).any()) continue;
-      if (!triangles_cross(corners, f, kInsideSlack * size)) continue;
-      outside.push_back(t);
-      break;
-    }
+    if (vertices_inside && boundary.crosses(corners, kInsideSlack * size)) outside.push_back(t);
   }
   return outside;
 }

@@ -35,9 +35,10 @@ class Optimiser {
         places_(points.places),
         skeleton_(skeleton),
         skin_(skin),
-        grid_(samples.points, 0.4 * h),
+        samples_(samples.points, 0.4 * h),
+        triangles_(samples.triangles),
         h_(h),
-        on_boundary_(mesh_.boundary_vertices()) {
+        boundary_faces_(mesh_.boundary_faces()) {
     for (const std::vector<int>& chain : points.chains)
       for (std::size_t i = 1; i < chain.size(); ++i) bone_edges_.insert(std::minmax(chain[i - 1], chain[i]));
   }
@@ -47,7 +48,7 @@ class Optimiser {
       flip_sweep();
       for (int v = 0; v < static_cast<int>(mesh_.points.size()); ++v) {
         if (mesh_.star(v).empty() || places_[v].fixed) continue;
-        if (on_boundary_[v] && places_[v].bone < 0) pull(v);
+        if (on_boundary(v) && places_[v].bone < 0) pull(v);
         climb(v);
       }
     }
@@ -63,15 +64,18 @@ class Optimiser {
   void pull(int v);
   void climb(int v);
   bool try_move(int v, const Vector3d& target, double at_least);
-  bool keeps_samples(int v, const Vector3d& target);
+  bool on_boundary(int v) const { return !boundary_faces_[v].empty(); }
+  bool keeps_skin(int v, const Vector3d& target);
 
   TetMesh mesh_;
   std::vector<LatticePoints::Place> places_;
   const ReducedSkeleton& skeleton_;
   const UnitSkin& skin_;
-  SampleGrid grid_;
+  SampleGrid samples_;
+  const TriangleGrid& triangles_;
   double h_;
-  std::vector<bool> on_boundary_;
+  /// Per vertex the other two corners of its boundary faces. Flips and moves keep the faces.
+  std::vector<std::vector<std::array<int, 2>>> boundary_faces_;
   EdgeSet bone_edges_;
 };
 
@@ -97,19 +101,19 @@ bool Optimiser::flip(int t) {
   return false;
 }
 
-/// True where every sample in the star of v now is still in it with v at `target`. Samples elsewhere are not
-/// touched by the move.
-bool Optimiser::keeps_samples(int v, const Vector3d& target) {
+/// True where, with v at `target`, no skin triangle crosses its boundary faces and every sample that was in
+/// its star still is. Samples elsewhere are not touched by the move.
+bool Optimiser::keeps_skin(int v, const Vector3d& target) {
   const std::vector<int>& star = mesh_.star(v);
   const Vector3d old = mesh_.points[v];
   Vector3d low = old.cwiseMin(target), high = old.cwiseMax(target);
-  // Only faces of the star that hold v sweep through space, and they stay in this box.
-  for (int t : star)
-    for (int u : mesh_.tet(t)) {
-      if (u == v || !on_boundary_[u]) continue;
+  for (const auto& [a, b] : boundary_faces_[v]) {
+    if (triangles_.crosses({target, mesh_.points[a], mesh_.points[b]}, 0.0)) return false;
+    for (const int u : {a, b}) {
       low = low.cwiseMin(mesh_.points[u]);
       high = high.cwiseMax(mesh_.points[u]);
     }
+  }
   const auto in_star = [&](const Vector3d& at, const Vector3d& p) {
     mesh_.points[v] = at;
     return std::any_of(star.begin(), star.end(), [&](int t) {
@@ -119,7 +123,7 @@ bool Optimiser::keeps_samples(int v, const Vector3d& target) {
     });
   };
   const bool kept =
-      grid_.all_of(low, high, [&](const Vector3d& p) { return in_star(target, p) || !in_star(old, p); });
+      samples_.all_of(low, high, [&](const Vector3d& p) { return in_star(target, p) || !in_star(old, p); });
   mesh_.points[v] = old;
   return kept;
 }
@@ -130,7 +134,7 @@ bool Optimiser::try_move(int v, const Vector3d& target, double at_least) {
   const double after = mesh_.star_quality(v);
   mesh_.points[v] = old;
   if (!(after > at_least)) return false;
-  if (on_boundary_[v] && !keeps_samples(v, target)) return false;
+  if (on_boundary(v) && !keeps_skin(v, target)) return false;
   mesh_.points[v] = target;
   return true;
 }
@@ -153,7 +157,7 @@ void Optimiser::pull(int v) {
 /// bone.
 void Optimiser::climb(int v) {
   double quality = mesh_.star_quality(v);
-  if (on_boundary_[v] && places_[v].bone < 0 && quality > kPullQuality) return;
+  if (on_boundary(v) && places_[v].bone < 0 && quality > kPullQuality) return;
   LatticePoints::Place& place = places_[v];
   double step = kFirstStep * h_;
   for (int halving = 0; halving <= kHalvings; ++halving, step *= 0.5) {

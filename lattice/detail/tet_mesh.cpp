@@ -112,7 +112,7 @@ std::vector<Tet> TetMesh::cells() const {
   return list;
 }
 
-std::vector<bool> TetMesh::boundary_vertices() const {
+std::vector<std::vector<std::array<int, 2>>> TetMesh::boundary_faces() const {
   std::vector<std::array<int, 3>> faces;
   for (int t = 0; t < num_slots(); ++t) {
     if (!alive_[t]) continue;
@@ -123,14 +123,15 @@ std::vector<bool> TetMesh::boundary_vertices() const {
     }
   }
   std::sort(faces.begin(), faces.end());
-  std::vector<bool> on_boundary(points.size(), false);
+  std::vector<std::vector<std::array<int, 2>>> result(points.size());
   for (std::size_t i = 0; i < faces.size();) {
     const bool paired = i + 1 < faces.size() && faces[i] == faces[i + 1];
     if (!paired)
-      for (int v : faces[i]) on_boundary[v] = true;
+      for (int k = 0; k < 3; ++k)
+        result[faces[i][k]].push_back({faces[i][(k + 1) % 3], faces[i][(k + 2) % 3]});
     i += paired ? 2 : 1;
   }
-  return on_boundary;
+  return result;
 }
 
 TetMesh::Ring TetMesh::ring(int a, int b) const {

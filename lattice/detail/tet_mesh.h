@@ -43,8 +43,8 @@ class TetMesh {
 
   /// The living cells, in slot order.
   std::vector<Tet> cells() const;
-  /// Per vertex: true where it lies on a face that only one cell has.
-  std::vector<bool> boundary_vertices() const;
+  /// Per vertex the other two corners of the faces that it shares with no second cell.
+  std::vector<std::vector<std::array<int, 2>>> boundary_faces() const;
 
   /// The cells round the edge a-b in cyclic order with their rim, counter-clockwise seen from b; empty where
   /// the edge lies on the boundary. Cell i holds rim vertices i and i + 1.

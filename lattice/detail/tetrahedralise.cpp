@@ -108,7 +108,26 @@ std::vector<int> unfinished_bones(const LatticePoints& points, const Triangulati
   return bones;
 }
 
-/// The cells that hold a sample or an edge of a bone.
+/// Keeps every cell beyond a face that a skin triangle crosses, until none leaves the kept cells.
+void keep_crossed_cells(const LatticePoints& points, Delaunay& delaunay, const SkinSamples& samples) {
+  std::vector<Delaunay::Cell_handle> open;
+  for (auto c = delaunay.finite_cells_begin(); c != delaunay.finite_cells_end(); ++c)
+    if (c->info()) open.push_back(c);
+  while (!open.empty()) {
+    const Delaunay::Cell_handle cell = open.back();
+    open.pop_back();
+    for (int k = 0; k < 4; ++k) {
+      const Delaunay::Cell_handle neighbour = cell->neighbor(k);
+      if (neighbour->info() || delaunay.is_infinite(neighbour)) continue;
+      const auto corner = [&](int i) { return points.points[cell->vertex((k + i) % 4)->info()]; };
+      if (!samples.triangles.crosses({corner(1), corner(2), corner(3)}, 0.0)) continue;
+      neighbour->info() = true;
+      open.push_back(neighbour);
+    }
+  }
+}
+
+/// The cells that hold a sample, a piece of a skin triangle or an edge of a bone.
 Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const SkinSamples& samples) {
   Delaunay& delaunay = triangulation.delaunay;
   for (auto c = delaunay.all_cells_begin(); c != delaunay.all_cells_end(); ++c) c->info() = false;
@@ -128,6 +147,7 @@ Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const
         circulator->info() = true;
       } while (++circulator != first);
     }
+  keep_crossed_cells(points, delaunay, samples);
   Tetrahedra cells;
   for (auto c = delaunay.finite_cells_begin(); c != delaunay.finite_cells_end(); ++c)
     if (c->info())

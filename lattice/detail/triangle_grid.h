@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace sinew::lattice::detail {
+
+using TriangleCorners = std::array<Eigen::Vector3d, 3>;
+
+/// True where an edge of one triangle passes through the inside of the other, by more than `eps` on either
+/// side of it and away from its border. Triangles that only touch, or lie in one plane, do not cross.
+bool triangles_cross(const TriangleCorners& a, const TriangleCorners& b, double eps);
+
+/// Triangles in a uniform grid, for questions about one more triangle. Not for several threads at once.
+class TriangleGrid {
+ public:
+  TriangleGrid(std::vector<TriangleCorners> triangles, double side);
+
+  /// True where some triangle crosses `t`.
+  bool crosses(const TriangleCorners& t, double eps) const;
+
+ private:
+  Eigen::Vector3i cell_of(const Eigen::Vector3d& p) const;
+
+  std::vector<TriangleCorners> triangles_;
+  Eigen::Vector3d low_{0, 0, 0};
+  double side_;
+  Eigen::Vector3i count_{1, 1, 1};
+  std::vector<std::vector<int>> cells_;
+  mutable std::vector<int> seen_;  ///< number of the question that looked at a triangle last.
+  mutable int question_ = 0;
+};
+
+}  // namespace sinew::lattice::detail
