@@ -172,6 +172,21 @@ def check_sizes(root):
         yield f"assets/samples: {samples} bytes in all, expected at most {MAX_SAMPLE_BYTES}"
 
 
+def check_references(root):
+    """Every source cited in the code stands in the README, and every path that the README names is there."""
+    readme = read(root, "README.md")
+    listed = set(re.findall(r"^- \[(\w+)\]", readme, re.MULTILINE))
+    for name in sources(root):
+        for line, content in enumerate(read(root, name).splitlines(), 1):
+            for key in re.findall(r"\[([A-Z][A-Za-z]+\d\d[a-z]?)(?=[\],;])", content):
+                if key not in listed:
+                    yield f"{name}:{line}: [{key}]: not among the README's references"
+    for path in re.findall(r"\]\(([^)#:]+)\)|(?<![\w/])((?:assets|tools|tests)/[\w./-]+\w)", readme):
+        path = path[0] or path[1]
+        if not os.path.exists(os.path.join(root, path)):
+            yield f"README.md: {path}: not there"
+
+
 def check_format(root):
     tool = next((t for t in ("clang-format-14", "clang-format") if shutil.which(t)), None)
     version = subprocess.run([tool, "--version"], capture_output=True, text=True, check=True).stdout if tool else ""
@@ -188,7 +203,7 @@ def check_format(root):
 
 
 RULES = {"layout": check_layout, "includes": check_includes, "words": check_words, "sizes": check_sizes,
-         "format": check_format}
+         "references": check_references, "format": check_format}
 
 
 def main():

@@ -9,7 +9,8 @@ import unittest
 import check_tree
 
 GOOD = {
-    "README.md": "# A tree\n",
+    "README.md": "# A tree\n\n![picture](assets/a.png) tools/main.cpp\n\n- [Gauss09] Theoria motus.\n",
+    "assets/a.png": "picture",
     "lattice/cell.h": "#pragma once\n\n#include <vector>\n\n#include <Eigen/Core>\n",
     "lattice/detail/mesh.h": "#pragma once\n\n#include <CGAL/Mesh_3.h>\n",
     "lattice/cell.cpp": '#include "lattice/cell.h"\n\n#include <CGAL/Mesh_3.h>\n\n#include "lattice/detail/mesh.h"\n',
@@ -43,7 +44,7 @@ class CheckTree(unittest.TestCase):
             self.assertTrue(offence.startswith(start), offence)
 
     def test_a_good_tree_passes(self):
-        for rule in ("layout", "includes", "words", "sizes"):
+        for rule in ("layout", "includes", "words", "sizes", "references"):
             self.assertEqual(self.offences(rule), [], rule)
 
     def test_other_top_level_folders_are_found(self):
@@ -91,6 +92,12 @@ class CheckTree(unittest.TestCase):
         for i in range(4):
             self.write(f"assets/samples/{i}.glb", "x" * 800_000)
         self.expect("sizes", "assets/heavy.bin: 1000001 bytes", "fem/long.cpp: 601 lines", "assets/samples: 3200000")
+
+    def test_dangling_references_are_found(self):
+        self.write("fem/law.cpp", "// [Gauss09, sec. 3], [Euler44]\nint x = points[kHats12];\n")
+        self.write("README.md", "- [Gauss09] Theoria.\n\n![picture](assets/b.png), run tools/go and `tests`\n")
+        self.expect("references", "fem/law.cpp:1: [Euler44]", "README.md: assets/b.png",
+                    "README.md: tools/go")
 
 
 if __name__ == "__main__":
