@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "assets/error.h"
+#include "tests/comma_locale.h"
 #include "tools/scene_fields.h"
 
 namespace sinew::tools {
@@ -277,6 +278,19 @@ TEST_F(SceneFile, ReadsBackExactlyWhatIsPrinted) {
     EXPECT_EQ(read(text), scene) << text;
   }
   EXPECT_EQ(read(print_scene(Scene{})), Scene{});
+}
+
+TEST_F(SceneFile, IsReadAndPrintedTheSameWhereTheLocaleWritesCommas) {
+  std::mt19937_64 rng(20022);
+  const Scene scene = random_scene(rng);
+  const std::string text = print_scene(scene);
+  const CommaLocale comma;
+  EXPECT_EQ(print_scene(scene), text);
+  EXPECT_EQ(read(text), scene);
+  Scene from_flag;
+  set_from_text(from_flag, *find_scene_field("poisson"), "0.25", "--poisson");
+  EXPECT_EQ(from_flag.poisson, 0.25);
+  EXPECT_EQ(refusal("poisson = 0.75"), "scene.toml:1: poisson: got 0.75, expected -1 < nu < 0.5; hint: 0.49");
 }
 
 TEST_F(SceneFile, PrintsEveryKey) {
