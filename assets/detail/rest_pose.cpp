@@ -1,0 +1,330 @@
+#include "assets/detail/rest_pose.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "assets/detail/text.h"
+#include "assets/detail/transforms.h"
+#include "assets/error.h"
+
+namespace sinew::assets::detail {
+
+namespace {
+
+/// The promise of the self-check, as a share of the diagonal.
+constexpr double kRestTolerance = 1e-4;
+/// Node pose and bind pose count as the same below this share of a mesh's diagonal: bind matrices are floats
+/// that went through several programs (1e-5 is usual), while another pose moves joints by many per cent.
+constexpr double kSamePose = 1e-3;
+/// A character that stands within this share of its diagonal from where it was bound is left where it was
+/// bound, so that its feet stay on the ground it was modelled on.
+constexpr double kLeaveInPlace = 0.15;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+Eigen::AlignedBox3d box_of(const lattice::Points& points) {
+  Eigen::AlignedBox3d box;
+  for (Eigen::Index v = 0; v < points.rows(); ++v) box.extend(points.row(v).transpose());
+  return box;
+}
+
+/// Largest distance between two affine maps over a box, attained at a corner.
+double distance(const Eigen::Affine3d& a, const Eigen::Affine3d& b, const Eigen::AlignedBox3d& box) {
+  double largest = 0.0;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+    largest = std::max(largest, (a * corner - b * corner).norm());
+  }
+  return largest;
+}
+
+/// The signed permutation of axes nearest to `a`, among those whose determinant has the sign of `hand` (24 of
+/// 48).
+Eigen::Matrix3d snap_to_axes(const Eigen::Matrix3d& a, double hand) {
+  std::array<int, 3> axes{0, 1, 2};
+  Eigen::Matrix3d best = Eigen::Matrix3d::Identity();
+  double best_trace = -1e300;
+  do {
+    for (int signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d candidate = Eigen::Matrix3d::Zero();
+      for (int c = 0; c < 3; ++c) candidate(axes[at(c)], c) = ((signs >> c) & 1) != 0 ? -1.0 : 1.0;
+      if (candidate.determinant() * hand < 0.0) continue;
+      const double trace = (candidate.transpose() * a).trace();
+      if (trace > best_trace + 1e-12) {
+        best_trace = trace;
+        best = candidate;
+      }
+    }
+  } while (std::next_permutation(axes.begin(), axes.end()));
+  return best;
+}
+
+class RestFinder {
+ public:
+  explicit RestFinder(const ImportedScene& scene) : scene_(scene) {}
+
+  RestPose run() {
+    pose_nodes();
+    weigh_joints();
+    result_.rest_from_node.assign(scene_.nodes.size(), Eigen::Affine3d::Identity());
+    result_.rest_from_mesh.assign(scene_.skins.size(), Eigen::Affine3d::Identity());
+    resolved_.assign(scene_.nodes.size(), false);
+    align_skins();
+    complete_tree();
+    return std::move(result_);
+  }
+
+ private:
+  void pose_nodes() {
+    for (const ImportedNode& node : scene_.nodes) {
+      result_.world_from_node.push_back(node.parent < 0 ? node.parent_from_node
+                                                        : result_.world_from_node[at(node.parent)] *
+                                                              node.parent_from_node);
+    }
+  }
+
+  void weigh_joints() {
+    result_.weight_of_node.assign(scene_.nodes.size(), 0.0);
+    boxes_.resize(scene_.skins.size());
+    for (const ImportedSkin& skin : scene_.skins) weights_.emplace_back(skin.joints.size(), 0.0);
+    for (const ImportedInstance& instance : scene_.instances) {
+      if (instance.skin < 0) continue;
+      const ImportedMesh& mesh = scene_.meshes[at(instance.mesh)];
+      boxes_[at(instance.skin)].extend(box_of(mesh.points));
+      for (const auto& influences : mesh.weights) {
+        for (const lattice::Influence& influence : influences) {
+          weights_[at(instance.skin)][at(influence.frame)] += influence.weight;
+          result_.weight_of_node[at(scene_.skins[at(instance.skin)].joints[at(influence.frame)])] +=
+              influence.weight;
+        }
+      }
+    }
+  }
+
+  /// T_kj of the joints of skin k that carry weight, with that weight.
+  std::vector<std::pair<Eigen::Affine3d, double>> joint_maps(std::size_t k) const {
+    std::vector<std::pair<Eigen::Affine3d, double>> maps;
+    for (std::size_t j = 0; j < weights_[k].size(); ++j) {
+      if (weights_[k][j] <= 0.0) continue;
+      maps.emplace_back(
+          result_.world_from_node[at(scene_.skins[k].joints[j])] * scene_.skins[k].joint_from_mesh[j],
+          weights_[k][j]);
+    }
+    return maps;
+  }
+
+  static bool usable(const Eigen::Affine3d& map) {
+    return map.matrix().allFinite() && std::abs(map.linear().determinant()) > 1e-30;
+  }
+
+  Eigen::Affine3d own_alignment(std::size_t k) const {
+    auto maps = joint_maps(k);
+    std::erase_if(maps, [](const auto& map) { return !usable(map.first); });
+    if (maps.empty()) return Eigen::Affine3d::Identity();
+    const auto& heaviest = *std::max_element(
+        maps.begin(), maps.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    const double scale = median_scale(maps);
+    const double size = scale * boxes_[k].diagonal().norm();
+    const bool same_pose = std::all_of(maps.begin(), maps.end(), [&](const auto& map) {
+      return distance(map.first, heaviest.first, boxes_[k]) <= kSamePose * size;
+    });
+    if (same_pose) return heaviest.first;
+    return similarity(maps, scale, k);
+  }
+
+  static double median_scale(const std::vector<std::pair<Eigen::Affine3d, double>>& maps) {
+    std::vector<std::pair<double, double>> scales;
+    double total = 0.0;
+    for (const auto& [map, weight] : maps) {
+      scales.emplace_back(std::cbrt(std::abs(map.linear().determinant())), weight);
+      total += weight;
+    }
+    std::sort(scales.begin(), scales.end());
+    double below = 0.0;
+    for (const auto& [scale, weight] : scales) {
+      below += weight;
+      if (below >= 0.5 * total) return scale;
+    }
+    return scales.back().first;
+  }
+
+  Eigen::Affine3d similarity(const std::vector<std::pair<Eigen::Affine3d, double>>& maps, double scale,
+                             std::size_t k) const {
+    double hand = 0.0;
+    for (const auto& [map, weight] : maps) hand += map.linear().determinant() < 0.0 ? -weight : weight;
+    Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+    double total = 0.0;
+    for (const auto& [map, weight] : maps) {
+      if ((map.linear().determinant() < 0.0) != (hand < 0.0)) continue;
+      mean += weight * nearest_orthogonal(map.linear());
+    }
+    Eigen::Affine3d result = Eigen::Affine3d::Identity();
+    result.linear() = scale * snap_to_axes(mean, hand < 0.0 ? -1.0 : 1.0);
+    const Eigen::Vector3d centre = boxes_[k].center();
+    for (const auto& [map, weight] : maps) {
+      shift += weight * (map * centre - result * centre);
+      total += weight;
+    }
+    shift /= total;
+    if (shift.norm() > kLeaveInPlace * scale * boxes_[k].diagonal().norm()) result.translation() = shift;
+    return result;
+  }
+
+  void align_skins() {
+    std::vector<std::size_t> order(scene_.skins.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto total = [this](std::size_t k) {
+      return std::accumulate(weights_[k].begin(), weights_[k].end(), 0.0);
+    };
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return total(a) > total(b); });
+    for (const std::size_t k : order) {
+      // Skins that no mesh uses may hold leftovers; they decide nothing.
+      if (total(k) <= 0.0) continue;
+      result_.rest_from_mesh[k] = align_skin(k);
+      const ImportedSkin& skin = scene_.skins[k];
+      for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+        if (resolved_[at(skin.joints[j])]) continue;
+        result_.rest_from_node[at(skin.joints[j])] =
+            result_.rest_from_mesh[k] * skin.joint_from_mesh[j].inverse();
+        resolved_[at(skin.joints[j])] = true;
+      }
+      if (!first_aligned_) first_aligned_ = k;
+    }
+  }
+
+  Eigen::Affine3d align_skin(std::size_t k) const {
+    const ImportedSkin& skin = scene_.skins[k];
+    double best = -1.0;
+    std::size_t joint = 0;
+    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+      if (!resolved_[at(skin.joints[j])] || weights_[k][j] <= best) continue;
+      best = weights_[k][j];
+      joint = j;
+    }
+    if (best >= 0.0) return result_.rest_from_node[at(skin.joints[joint])] * skin.joint_from_mesh[joint];
+    const Eigen::Affine3d own = own_alignment(k);
+    if (!first_aligned_) return own;
+    // Skins without a common joint: bound in the same space if they were turned and scaled alike.
+    const Eigen::Affine3d& first = result_.rest_from_mesh[*first_aligned_];
+    return own.linear().isApprox(first.linear(), kSamePose) ? first : own;
+  }
+
+  /// parent_from_node with what is scaled to nothing in the node pose kept at unit size: a rest frame must be
+  /// invertible, and only nodes without weight get theirs from here.
+  Eigen::Affine3d invertible_local(std::size_t n) const {
+    const ImportedNode& node = scene_.nodes[n];
+    const double volume = std::abs(node.parent_from_node.linear().determinant());
+    if (volume > 1e-12 * std::pow(node.parent_from_node.linear().norm(), 3)) return node.parent_from_node;
+    skeleton::LocalTransform local = node.local;
+    for (int c = 0; c < 3; ++c) {
+      if (std::abs(local.scale[c]) < 1e-6 * std::max(local.scale.cwiseAbs().maxCoeff(), 1e-6))
+        local.scale[c] = 1.0;
+    }
+    return local.matrix();
+  }
+
+  void complete_tree() {
+    const std::size_t n = scene_.nodes.size();
+    const auto hang_on_parents = [&] {
+      for (std::size_t i = 0; i < n; ++i) {
+        const int parent = scene_.nodes[i].parent;
+        if (resolved_[i] || parent < 0 || !resolved_[at(parent)]) continue;
+        result_.rest_from_node[i] = result_.rest_from_node[at(parent)] * invertible_local(i);
+        resolved_[i] = true;
+      }
+    };
+    hang_on_parents();
+    for (std::size_t i = n; i-- > 0;) {
+      const int parent = scene_.nodes[i].parent;
+      if (!resolved_[i] || parent < 0 || resolved_[at(parent)]) continue;
+      result_.rest_from_node[at(parent)] = result_.rest_from_node[i] * invertible_local(i).inverse();
+      resolved_[at(parent)] = true;
+    }
+    hang_on_parents();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (resolved_[i]) continue;
+      const int parent = scene_.nodes[i].parent;
+      result_.rest_from_node[i] =
+          parent < 0 ? invertible_local(i) : result_.rest_from_node[at(parent)] * invertible_local(i);
+      resolved_[i] = true;
+    }
+  }
+
+  const ImportedScene& scene_;
+  RestPose result_;
+  std::vector<std::vector<double>> weights_;  ///< per skin and joint.
+  std::vector<Eigen::AlignedBox3d> boxes_;    ///< per skin, of its meshes' points.
+  std::vector<bool> resolved_;                ///< per node.
+  std::optional<std::size_t> first_aligned_;
+};
+
+/// The up to three things with the largest error, worst first.
+template <typename Name>
+std::string worst_three(const std::vector<double>& errors, double limit, const Name& name) {
+  std::vector<std::size_t> offenders;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (errors[i] > limit) offenders.push_back(i);
+  }
+  std::stable_sort(offenders.begin(), offenders.end(),
+                   [&](std::size_t a, std::size_t b) { return errors[a] > errors[b]; });
+  std::string list;
+  for (std::size_t i = 0; i < offenders.size() && i < 3; ++i) {
+    list += (i > 0 ? ", '" : "'") + printable(name(offenders[i])) + "'";
+  }
+  if (offenders.size() > 3) list += " and " + std::to_string(offenders.size() - 3) + " more";
+  return list;
+}
+
+}  // namespace
+
+RestPose find_rest_pose(const ImportedScene& scene) { return RestFinder(scene).run(); }
+
+void check_rest_pose(const std::string& file, const ImportedScene& scene, const RestPose& rest) {
+  Eigen::AlignedBox3d box;
+  std::vector<double> parts(scene.meshes.size(), 0.0), joints(scene.nodes.size(), 0.0);
+  double worst = 0.0;
+  for (const ImportedInstance& instance : scene.instances) {
+    if (instance.skin < 0) continue;
+    const ImportedMesh& mesh = scene.meshes[at(instance.mesh)];
+    const ImportedSkin& skin = scene.skins[at(instance.skin)];
+    std::vector<Eigen::Affine3d> maps;
+    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+      maps.push_back(rest.rest_from_node[at(skin.joints[j])] * skin.joint_from_mesh[j]);
+    }
+    for (std::size_t v = 0; v < mesh.weights.size(); ++v) {
+      const Eigen::Vector3d p = mesh.points.row(static_cast<Eigen::Index>(v)).transpose();
+      const Eigen::Vector3d expected = rest.rest_from_mesh[at(instance.skin)] * p;
+      box.extend(expected);
+      Eigen::Vector3d skinned = Eigen::Vector3d::Zero();
+      for (const lattice::Influence& influence : mesh.weights[v]) {
+        const Eigen::Vector3d moved = maps[at(influence.frame)] * p;
+        skinned += influence.weight * moved;
+        double& joint = joints[at(skin.joints[at(influence.frame)])];
+        joint = std::max(joint, influence.weight * (moved - expected).norm());
+      }
+      const double error = (skinned - expected).norm();
+      double& part = parts[at(instance.mesh)];
+      part = std::max(part, error);
+      worst = std::max(worst, error);
+    }
+  }
+  if (box.isEmpty()) return;
+  const double limit = kRestTolerance * box.diagonal().norm();
+  if (worst <= limit) return;
+  throw InputError(
+      file,
+      "skin: the bind matrices do not agree: skinning the rest pose misses the mesh, got " +
+          number(100.0 * worst / box.diagonal().norm()) + " % of its diagonal, expected at most " +
+          number(100.0 * kRestTolerance) + " %; worst joints " +
+          worst_three(joints, limit, [&](std::size_t n) { return name_of(scene, static_cast<int>(n)); }) +
+          "; worst parts " + worst_three(parts, limit, [&](std::size_t m) { return scene.meshes[m].name; }) +
+          "; hint: put the character into one pose and bind all its meshes again");
+}
+
+}  // namespace sinew::assets::detail

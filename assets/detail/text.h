@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace sinew::assets::detail {
+
+/// `text` with control characters and bytes that are not UTF-8 written as \xNN, so that names from a file
+/// cannot break a line or a terminal.
+std::string printable(std::string_view text);
+
+/// A number for a message: short, and "nan" or "inf" where it is not finite.
+std::string number(double value);
+
+}  // namespace sinew::assets::detail
