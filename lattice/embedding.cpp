@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <stdexcept>
+#include <string>
 
 #include <Eigen/Geometry>
 
@@ -33,6 +34,13 @@ class CellBins {
       const Eigen::Vector3i high = bin_of(boxes_[static_cast<std::size_t>(i)].max());
       for_each_bin(low, high, [&](std::vector<int>& bin) { bin.push_back(i); });
     }
+  }
+
+  /// The cell whose box is nearest to p; the smallest index where several are.
+  int nearest(const Eigen::Vector3d& p) const {
+    const auto distance = [&](const Box& box) { return box.squaredExteriorDistance(p); };
+    const auto closer = [&](const Box& a, const Box& b) { return distance(a) < distance(b); };
+    return static_cast<int>(std::min_element(boxes_.begin(), boxes_.end(), closer) - boxes_.begin());
   }
 
   const Box& box(int cell) const { return boxes_[static_cast<std::size_t>(cell)]; }
@@ -99,9 +107,31 @@ Place best_place(const LeafMesh& mesh, const std::vector<int>& candidates, const
   return best;
 }
 
+/// Local coordinates by the affine map at the cell's centre: for points so far away that the trilinear map
+/// cannot be inverted there.
+Place affine_place(const LeafMesh& mesh, int cell, const Eigen::Vector3d& p) {
+  const HexCorners corners = hex_corners(mesh.points, mesh.cells[static_cast<std::size_t>(cell)]);
+  const Eigen::Vector3d centre = Eigen::Vector3d::Constant(0.5);
+  const Eigen::Vector3d from_centre = p - corners.colwise().mean().transpose();
+  Place place;
+  place.cell = cell;
+  place.local.xi = centre + trilinear_jacobian(corners, centre).partialPivLu().solve(from_centre);
+  place.local.outside = std::max(-place.local.xi.minCoeff(), place.local.xi.maxCoeff() - 1.0);
+  return place;
+}
+
+void check_input(const LeafMesh& mesh, const Points& points) {
+  if (mesh.cells.empty()) throw std::invalid_argument("embed: the lattice has no cells");
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    if (!points.row(i).allFinite())
+      throw std::invalid_argument("embed: point " + std::to_string(i) + " is not finite");
+  }
+}
+
 }  // namespace
 
 Embedding embed(const LeafMesh& mesh, const Points& points) {
+  check_input(mesh, points);
   Embedding embedding;
   const auto n = points.rows();
   embedding.cell.assign(static_cast<std::size_t>(n), -1);
@@ -114,12 +144,13 @@ Embedding embed(const LeafMesh& mesh, const Points& points) {
     Place place = best_place(mesh, bins.near(p, 1e-9 * bins.size()), p);
     if (place.cell < 0 || place.local.outside > 1e-9) {
       embedding.outside.push_back(static_cast<int>(i));
-      // Widen until some cell is near enough; the bins end at the lattice's bounds, so this ends.
-      for (double reach = 0.25 * bins.size();; reach *= 2.0) {
+      // Widen until some cell is near enough; Newton's method does not reach farther than this.
+      for (double reach = 0.25 * bins.size(); reach < 16.0 * bins.size(); reach *= 2.0) {
         const Place wider = best_place(mesh, bins.near(p, reach), p);
         if (wider.cell >= 0 && (place.cell < 0 || wider.local.outside < place.local.outside)) place = wider;
-        if (place.cell >= 0 || !std::isfinite(reach)) break;
+        if (place.cell >= 0) break;
       }
+      if (place.cell < 0) place = affine_place(mesh, bins.nearest(p), p);
     }
     embedding.cell[static_cast<std::size_t>(i)] = place.cell;
     embedding.xi.row(i) = place.local.xi.transpose();

@@ -22,6 +22,7 @@ struct Embedding {
 
 /// Embeds `points` (num_points x 3 [m]) in the leaf cells. Reproduces each point to 1e-12 of the lattice's
 /// size where Newton's method converges. A point on a shared face goes to the cell with the smaller index.
+/// Throws std::invalid_argument where a point is not finite or the lattice has no cells.
 Embedding embed(const LeafMesh& mesh, const Points& points);
 
 }  // namespace sinew::lattice

@@ -1,0 +1,75 @@
+#include "lattice/embedding.h"
+
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "tests/lattice/lattices.h"
+
+namespace sinew::lattice {
+namespace {
+
+TEST(Embedding, ReproducesPointsInsideToRounding) {
+  std::mt19937_64 rng(20);
+  for (const auto& [name, complex] : tests::lattices_of_every_kind(0.15)) {
+    const Hierarchy hierarchy(complex, 2);
+    for (int level = 1; level <= 2; ++level) {
+      const LeafMesh mesh = tests::uniform_mesh(hierarchy, level);
+      const Points at = tests::points_inside(mesh, 300, rng);
+      const Embedding embedding = embed(mesh, at);
+      EXPECT_TRUE(embedding.outside.empty()) << name;
+      // The promise of DESIGN section 3; the lattice is about 2 m across.
+      EXPECT_LE((embedding.weights * mesh.points - at).rowwise().norm().maxCoeff(), 1e-12) << name;
+      for (Eigen::Index i = 0; i < at.rows(); ++i) {
+        EXPECT_GE(embedding.xi.row(i).minCoeff(), -1e-9);
+        EXPECT_LE(embedding.xi.row(i).maxCoeff(), 1.0 + 1e-9);
+      }
+    }
+  }
+}
+
+TEST(Embedding, GivesASharedFaceToTheCellWithTheSmallerIndex) {
+  const Hierarchy hierarchy(box_lattice({{0, 0, 0}, {2, 1, 1}, {2, 1, 1}, CellType::Hexahedron, {}}), 1);
+  const LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);
+  Points p(2, 3);
+  p << 1.0, 0.3, 0.3, 1.0, 0.5, 0.5;
+  const Embedding embedding = embed(mesh, p);
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    int first = -1;
+    for (int c = static_cast<int>(mesh.cells.size()) - 1; c >= 0; --c) {
+      const HexCorners corners = hex_corners(mesh.points, mesh.cells[static_cast<std::size_t>(c)]);
+      const Eigen::RowVector3d low = corners.colwise().minCoeff(), high = corners.colwise().maxCoeff();
+      if ((p.row(i).array() >= low.array()).all() && (p.row(i).array() <= high.array()).all()) first = c;
+    }
+    EXPECT_EQ(embedding.cell[static_cast<std::size_t>(i)], first);
+  }
+}
+
+// On either side of the face x = 1 and at several distances: from just beyond the tolerance to a hundred
+// lengths.
+TEST(Embedding, ReportsPointsOutsideAndExtrapolatesThem) {
+  const Hierarchy hierarchy(box_lattice({{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, CellType::Hexahedron, {}}), 1);
+  const LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);
+  Points p(6, 3);
+  p << 1.0 - 1e-8, 0.5, 0.5,  // inside
+      1.0 + 1e-11, 0.5, 0.5,  // on the face to within the tolerance of 1e-9 in local coordinates
+      1.0 + 1e-8, 0.5, 0.5,   // just outside
+      1.3, 0.6, 0.5,          // about a cell away
+      -40.0, 0.5, 0.5,        // far away
+      0.5, 100.0, 100.0;      // a hundred lengths away
+  const Embedding embedding = embed(mesh, p);
+  EXPECT_EQ(embedding.outside, (std::vector<int>{2, 3, 4, 5}));
+  // The cells are cubes, so extrapolation is exact: 100 eps-sized errors times a distance of 100 cells.
+  EXPECT_LE((embedding.weights * mesh.points - p).cwiseAbs().maxCoeff(), 1e-9);
+  for (int cell : embedding.cell) EXPECT_GE(cell, 0);
+}
+
+TEST(Embedding, RefusesPointsThatAreNotFinite) {
+  const Hierarchy hierarchy(box_lattice({}), 1);
+  Points p = Points::Constant(2, 3, 0.5);
+  p(1, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(embed(tests::uniform_mesh(hierarchy, 1), p), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sinew::lattice
