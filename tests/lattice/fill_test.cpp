@@ -1,0 +1,100 @@
+#include "lattice/fill.h"
+
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "tests/lattice/lattices.h"
+
+namespace sinew::lattice {
+namespace {
+
+double filled_volume(const LeafMesh& mesh, const std::vector<FillFractions>& fill) {
+  double volume = 0.0;
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    const HexCorners corners = hex_corners(mesh.points, mesh.cells[c]);
+    const double cell = (corners.row(6) - corners.row(0)).cwiseAbs().prod();  // a box, its axes permuted
+    volume += cell * std::accumulate(fill[c].begin(), fill[c].end(), 0.0) / 8.0;
+  }
+  return volume;
+}
+
+/// Surface of the axis-parallel box [low, high], outward.
+Surface box_surface(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  Surface s;
+  s.points.resize(8, 3);
+  for (int k = 0; k < 8; ++k) {
+    for (int c = 0; c < 3; ++c)
+      s.points(k, c) = kCorners[static_cast<std::size_t>(k)][static_cast<std::size_t>(c)] ? high[c] : low[c];
+  }
+  s.triangles.resize(12, 3);
+  int t = 0;
+  for (const auto& face : cell_faces(CellType::Hexahedron)) {
+    s.triangles.row(t++) << face[0], face[1], face[2];
+    s.triangles.row(t++) << face[0], face[2], face[3];
+  }
+  return s;
+}
+
+TEST(FillFractions, OfASphereAddUpToItsVolume) {
+  const Surface sphere = tests::blob({0.03, 0.02, -0.01}, 48, 96, [](const Eigen::Vector3d&) { return 0.8; });
+  const SurfaceQuery query(sphere.points, sphere.triangles);
+  for (int blocks : {2, 4}) {
+    const Hierarchy hierarchy(
+        box_lattice({{-1, -1, -1}, {1, 1, 1}, Eigen::Vector3i::Constant(blocks), CellType::Hexahedron, {}}),
+        1);
+    const LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);
+    const double volume = filled_volume(mesh, fill_fractions(mesh, query, 0.0));
+    const double exact = 4.0 / 3.0 * std::numbers::pi * 0.512;
+    // Samples stand d = 2 / (8 blocks) apart. Counting lattice points in a ball errs by about the square root
+    // of the number of samples cut by the surface, 4 pi r^2 / d^2, times d^3: 0.7 % and 0.17 % of the volume;
+    // the inscribed polyhedron lacks 0.2 %. Twice that.
+    const double error = std::abs(volume / exact - 1.0);
+    EXPECT_LT(error, blocks == 2 ? 0.018 : 0.0075);
+  }
+}
+
+// The box's faces run through the middle between two layers of samples, so the share is exact in each octant.
+TEST(FillFractions, OfABoxAreExact) {
+  const Surface box = box_surface({0.0, 0.0, 0.0}, {0.75, 1.0, 0.5});
+  const SurfaceQuery query(box.points, box.triangles);
+  const Hierarchy hierarchy(box_lattice({{-1, -1, -1}, {1, 1, 1}, {2, 2, 2}, CellType::Hexahedron, {}}), 1);
+  const LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);
+  const std::vector<FillFractions> fill = fill_fractions(mesh, query, 0.0);
+  EXPECT_DOUBLE_EQ(filled_volume(mesh, fill), 0.375);
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    const HexCorners corners = hex_corners(mesh.points, mesh.cells[c]);
+    for (int k = 0; k < 8; ++k) {
+      // Octant k: the box between the cell's centre and its corner k.
+      const Eigen::RowVector3d centre = corners.colwise().mean();
+      const Eigen::RowVector3d low = corners.row(k).cwiseMin(centre), high = corners.row(k).cwiseMax(centre);
+      const Eigen::RowVector3d overlap =
+          (high.cwiseMin(Eigen::RowVector3d(0.75, 1.0, 0.5)) - low.cwiseMax(0.0)).cwiseMax(0.0);
+      EXPECT_DOUBLE_EQ(fill[c][static_cast<std::size_t>(k)], overlap.prod() / (high - low).prod());
+    }
+  }
+}
+
+TEST(FillFractions, GiveAnOpenSheetTheThicknessOfItsShell) {
+  Surface sheet;
+  sheet.points.resize(4, 3);
+  sheet.points << -2, -2, 0, 2, -2, 0, 2, 2, 0, -2, 2, 0;
+  sheet.triangles.resize(2, 3);
+  sheet.triangles << 0, 1, 2, 0, 2, 3;
+  const SurfaceQuery query(sheet.points, sheet.triangles);
+  const Hierarchy hierarchy(box_lattice({{-1, -1, -1}, {1, 1, 1}, {1, 1, 2}, CellType::Hexahedron, {}}), 1);
+  const LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);
+  // Samples lie at odd multiples of 1/16 from the sheet: 1/16 and 3/16 are within 0.2, so 0.5 of thickness is
+  // filled.
+  EXPECT_DOUBLE_EQ(filled_volume(mesh, fill_fractions(mesh, query, 0.2)), 4.0 * 0.5);
+}
+
+TEST(FilledCells, KeepsCellsWithFleshOrWithAnEmbeddedPoint) {
+  std::vector<FillFractions> fill(4, FillFractions{});
+  fill[1][5] = 0.125;
+  EXPECT_EQ(filled_cells(fill, {}), (std::vector<std::uint8_t>{0, 1, 0, 0}));
+  EXPECT_EQ(filled_cells(fill, {3, 3, -1}), (std::vector<std::uint8_t>{0, 1, 0, 1}));
+}
+
+}  // namespace
+}  // namespace sinew::lattice
