@@ -1,9 +1,11 @@
 #include "fem/blended_solver.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 namespace sinew::fem {
@@ -69,6 +71,21 @@ Coordinates nodal_coordinates(const Body& body) {
   return c;
 }
 
+/// Four lanes, of which three are used: the processor then works on pairs.
+using Lanes = Eigen::Vector4d;
+
+/// What M, K and P are applied to, side by side because one pass over the matrices applies all three.
+struct Inputs {
+  Lanes inertia = Lanes::Zero(), elastic = Lanes::Zero(), tie = Lanes::Zero();
+};
+
+/// K, M and P of one pair of leaf vertices: three columns of K, with M and P in the spare lanes.
+struct Couple {
+  Eigen::Matrix<double, 4, 3> stiffness;
+  double mass() const { return stiffness(3, 0); }
+  double tie() const { return stiffness(3, 1); }
+};
+
 /// Everything of one region that does not change with the step size.
 struct RegionSystem {
   const Region* region = nullptr;
@@ -82,12 +99,14 @@ struct RegionSystem {
   std::vector<int> row_start;  ///< of the rows' neighbours,
   std::vector<int> column;     ///< as local vertices;
   std::vector<int> entry;      ///< entries of the body's matrices start here, per row.
-  std::vector<std::uint8_t> row_has_tie;
-  std::vector<int> blended;  ///< local vertex of each of region->vertices, -1 for bone vertices.
+  std::vector<int> blended;    ///< local vertex of each of region->vertices, -1 for bone vertices.
   std::vector<std::pair<int, std::vector<std::pair<int, int>>>> ties;  ///< tie, (its entry, local row).
 
   // Buffers of the step, so that a step allocates nothing.
-  Points m, z, p, m_value, z_value, p_value, row_force;
+  std::vector<Inputs> coefficients;  ///< per function.
+  std::vector<Inputs> inputs;        ///< per local vertex.
+  Points row_force;                  ///< per row.
+  Points velocity;                   ///< per function, in rotated axes.
   Eigen::VectorXd solution, workspace;
   Points result;  ///< contribution to the blended velocity, one row per region->vertices.
 };
@@ -99,6 +118,9 @@ struct BlendedSolver::Impl {
   SolverOptions options;
   Coordinates coordinates;
   std::vector<RegionSystem> systems;
+  std::vector<Couple> couples;  ///< entries of body->matrices, packed for the step.
+  /// Systems that have a leaf vertex among their rows: (system, row).
+  std::vector<std::vector<std::pair<int, int>>> rows_of_vertex;
   std::map<std::pair<double, Integrator>, std::vector<Factor>> factors;
   std::vector<std::vector<int>> vertex_cells;  ///< leaf cells round a leaf vertex.
   std::vector<std::vector<int>> vertex_functions;
@@ -107,7 +129,9 @@ struct BlendedSolver::Impl {
   RegionSystem build_system(const Region& region) const;
   Eigen::SparseMatrix<double> matrix_of(const RegionSystem& system, const SystemFactors& c) const;
   struct StepData;
-  void solve_region(std::size_t index, const StepData& step, const Factor& factor);
+  void gather_inputs(RegionSystem& system, const StepData& step) const;
+  void apply_matrices(int vertex);
+  void solve_region(RegionSystem& system, const StepData& step, const Factor& factor) const;
 };
 
 namespace {
@@ -177,10 +201,8 @@ RegionSystem BlendedSolver::Impl::build_system(const Region& region) const {
   for (int r = 0; r < system.num_rows; ++r) {
     const auto a = static_cast<std::size_t>(system.vertices[static_cast<std::size_t>(r)]);
     system.entry.push_back(matrices.row_start[a]);
-    bool tied = false;
     for (int e = matrices.row_start[a]; e < matrices.row_start[a + 1]; ++e) {
       const auto b = static_cast<std::size_t>(matrices.column[static_cast<std::size_t>(e)]);
-      tied = tied || matrices.tie[static_cast<std::size_t>(e)] != 0.0;
       if (local_vertex[b] < 0) {
         local_vertex[b] = static_cast<int>(system.vertices.size());
         system.vertices.push_back(static_cast<int>(b));
@@ -188,7 +210,6 @@ RegionSystem BlendedSolver::Impl::build_system(const Region& region) const {
       system.column.push_back(local_vertex[b]);
     }
     system.row_start.push_back(static_cast<int>(system.column.size()));
-    system.row_has_tie.push_back(tied);
   }
   std::vector<Eigen::Triplet<double>> triplets, transposed;
   for (std::size_t r = 0; r < system.vertices.size(); ++r) {
@@ -220,7 +241,9 @@ RegionSystem BlendedSolver::Impl::build_system(const Region& region) const {
     if (!rows.empty()) system.ties.emplace_back(static_cast<int>(t), std::move(rows));
   }
   const auto num_functions = static_cast<Eigen::Index>(system.functions.size());
-  for (Points* buffer : {&system.m, &system.z, &system.p}) buffer->resize(num_functions, 3);
+  system.coefficients.resize(system.functions.size());
+  system.inputs.resize(system.vertices.size());
+  system.velocity.resize(num_functions, 3);
   system.row_force.resize(system.num_rows, 3);
   system.solution.resize(3 * system.num_unknown);
   system.result.resize(static_cast<Eigen::Index>(region.vertices.size()), 3);
@@ -243,6 +266,19 @@ void BlendedSolver::Impl::build_systems() {
   systems.resize(body->regions.size());
   tbb::parallel_for(std::size_t{0}, systems.size(),
                     [&](std::size_t i) { systems[i] = build_system(body->regions[i]); });
+  rows_of_vertex.resize(static_cast<std::size_t>(mesh.num_vertices()));
+  for (std::size_t i = 0; i < systems.size(); ++i) {
+    for (int r = 0; r < systems[i].num_rows; ++r) {
+      rows_of_vertex[static_cast<std::size_t>(systems[i].vertices[static_cast<std::size_t>(r)])].emplace_back(
+          static_cast<int>(i), r);
+    }
+  }
+  const LeafMatrices& matrices = body->matrices;
+  couples.resize(matrices.column.size());
+  for (std::size_t e = 0; e < couples.size(); ++e) {
+    couples[e].stiffness.topRows<3>() = matrices.stiffness[e];
+    couples[e].stiffness.row(3) << matrices.mass[e], matrices.tie[e], 0.0;
+  }
 }
 
 BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
@@ -333,64 +369,90 @@ struct BlendedSolver::Impl::StepData {
   Points x_h, v_h, x_known, v_known, x_now, x_past;  ///< coefficients.
 };
 
-void BlendedSolver::Impl::solve_region(std::size_t index, const StepData& step, const Factor& factor) {
-  RegionSystem& s = systems[index];
+namespace {
+
+Lanes lanes(const Eigen::Vector3d& v) { return {v[0], v[1], v[2], 0.0}; }
+
+}  // namespace
+
+/// What M, K and P act on in the region's axes at the end of the stage, first as coefficients, then at its
+/// vertices.
+void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) const {
   const Region& region = *s.region;
   const RegionTransform end = transform_of(region, *step.poses.stage);
   const RegionTransform now = transform_of(region, *step.poses.now);
   const RegionTransform past = step.use_past ? transform_of(region, *step.poses.before) : now;
   const Eigen::Matrix3d to_local = end.rotation.transpose();
+  const Eigen::Matrix3d now_local = now.rotation.transpose(), past_local = past.rotation.transpose();
   const double th = step.stage.theta * step.h;
   const double b = step.beta / (step.stage.kappa * step.h);
   const Eigen::Affine3d carried = end.from_rest * now.from_rest.inverse();
+
   for (std::size_t k = 0; k < s.functions.size(); ++k) {
     const int f = s.functions[k];
     const bool known = static_cast<int>(k) >= s.num_unknown;
-    const bool value = coordinates.is_value[static_cast<std::size_t>(f)] != 0;
+    // A detail is a difference of positions: it turns with the region but does not travel.
+    const double is_value = coordinates.is_value[static_cast<std::size_t>(f)] ? 1.0 : 0.0;
     const Eigen::Vector3d rest =
-        value ? Eigen::Vector3d(
-                    body->mesh.points.row(coordinates.vertex[static_cast<std::size_t>(f)]).transpose() -
-                    region.origin_rest)
-              : Eigen::Vector3d(0, 0, 0);
-    const auto local = [&](const RegionTransform& t, const Eigen::Vector3d& x) -> Eigen::Vector3d {
-      return t.rotation.transpose() * (value ? Eigen::Vector3d(x - t.origin) : x);
-    };
-    const Eigen::Vector3d x_stage = known ? step.x_known.row(f).transpose() : step.x_h.row(f).transpose();
-    const Eigen::Vector3d p = local(end, x_stage);
-    const Eigen::Vector3d u_end = p - rest;
-    Eigen::Vector3d u_past = local(now, step.x_now.row(f).transpose()) - rest;
-    if (step.use_past) u_past = (4.0 * u_past - (local(past, step.x_past.row(f).transpose()) - rest)) / 3.0;
+        is_value * (body->mesh.points.row(coordinates.vertex[static_cast<std::size_t>(f)]).transpose() -
+                    region.origin_rest);
     const Eigen::Vector3d x_now = step.x_now.row(f).transpose();
-    const Eigen::Vector3d moved =
-        value ? Eigen::Vector3d(carried * x_now) : Eigen::Vector3d(carried.linear() * x_now);
+    const Eigen::Vector3d x_stage = (known ? step.x_known : step.x_h).row(f).transpose();
+    const Eigen::Vector3d p = to_local * (x_stage - is_value * end.origin);
+    const Eigen::Vector3d u_end = p - rest;
+    Eigen::Vector3d u_past = now_local * (x_now - is_value * now.origin) - rest;
+    if (step.use_past) {
+      const Eigen::Vector3d u_before =
+          past_local * (step.x_past.row(f).transpose() - is_value * past.origin) - rest;
+      u_past = (4.0 * u_past - u_before) / 3.0;
+    }
+    const Eigen::Vector3d moved = carried.linear() * x_now + is_value * carried.translation();
     const Eigen::Vector3d v_frame = (moved - x_now) / step.elapsed;
     Eigen::Vector3d inertia = step.v_h.row(f).transpose() + (th * step.alpha) * v_frame;
     if (known) inertia -= (1.0 + th * step.alpha) * step.v_known.row(f).transpose();
-    const auto row = static_cast<Eigen::Index>(k);
-    s.m.row(row) = (to_local * inertia).transpose();
-    s.z.row(row) = ((1.0 + b) * u_end - b * u_past).transpose();
-    s.p.row(row) = p.transpose();
+    s.coefficients[k] = {lanes(to_local * inertia), lanes(-th * ((1.0 + b) * u_end - b * u_past)),
+                         lanes(-th * p)};
   }
-  s.m_value.noalias() = s.values * s.m;
-  s.z_value.noalias() = s.values * s.z;
-  s.p_value.noalias() = s.values * s.p;
-
-  const Eigen::Vector3d gravity = th * (to_local * step.gravity);
-  const LeafMatrices& matrices = body->matrices;
-  for (int r = 0; r < s.num_rows; ++r) {
-    const auto row = static_cast<std::size_t>(r);
-    Eigen::Vector3d inertia = Eigen::Vector3d::Zero(), elastic = Eigen::Vector3d::Zero(),
-                    tie = Eigen::Vector3d::Zero();
-    const auto first = static_cast<std::size_t>(s.entry[row]) - static_cast<std::size_t>(s.row_start[row]);
-    for (int k = s.row_start[row]; k < s.row_start[row + 1]; ++k) {
-      const auto e = first + static_cast<std::size_t>(k);
-      const Eigen::Index c = s.column[static_cast<std::size_t>(k)];
-      inertia += matrices.mass[e] * s.m_value.row(c).transpose();
-      elastic += matrices.stiffness[e] * s.z_value.row(c).transpose();
-      if (s.row_has_tie[row]) tie += matrices.tie[e] * s.p_value.row(c).transpose();
+  for (std::size_t r = 0; r < s.inputs.size(); ++r) {
+    Inputs sum;
+    for (RowSparse::InnerIterator it(s.values, static_cast<Eigen::Index>(r)); it; ++it) {
+      const Inputs& c = s.coefficients[static_cast<std::size_t>(it.col())];
+      sum.inertia += it.value() * c.inertia;
+      sum.elastic += it.value() * c.elastic;
+      sum.tie += it.value() * c.tie;
     }
-    const double mass = body->vertex_mass[static_cast<std::size_t>(s.vertices[row])];
-    s.row_force.row(r) = (inertia - th * (elastic + tie) + mass * gravity).transpose();
+    s.inputs[r] = sum;
+  }
+}
+
+/// Rows of one leaf vertex in all systems that have it: the matrices are read once for all of them.
+void BlendedSolver::Impl::apply_matrices(int vertex) {
+  const auto first = static_cast<std::size_t>(body->matrices.row_start[static_cast<std::size_t>(vertex)]);
+  const auto count =
+      static_cast<std::size_t>(body->matrices.row_start[static_cast<std::size_t>(vertex) + 1]) - first;
+  for (const auto& [system, row] : rows_of_vertex[static_cast<std::size_t>(vertex)]) {
+    RegionSystem& s = systems[static_cast<std::size_t>(system)];
+    const int* column = s.column.data() + s.row_start[static_cast<std::size_t>(row)];
+    Lanes sum = Lanes::Zero();
+    for (std::size_t k = 0; k < count; ++k) {
+      const Couple& couple = couples[first + k];
+      const Inputs& in = s.inputs[static_cast<std::size_t>(column[k])];
+      sum += couple.mass() * in.inertia + couple.tie() * in.tie;
+      for (int j = 0; j < 3; ++j) sum += in.elastic[j] * couple.stiffness.col(j);
+    }
+    s.row_force.row(row) = sum.head<3>().transpose();
+  }
+}
+
+void BlendedSolver::Impl::solve_region(RegionSystem& s, const StepData& step, const Factor& factor) const {
+  const Region& region = *s.region;
+  const RegionTransform end = transform_of(region, *step.poses.stage);
+  const Eigen::Matrix3d to_local = end.rotation.transpose();
+  const double th = step.stage.theta * step.h;
+  const Eigen::RowVector3d gravity = th * (to_local * step.gravity).transpose();
+  for (int r = 0; r < s.num_rows; ++r) {
+    s.row_force.row(r) +=
+        body->vertex_mass[static_cast<std::size_t>(s.vertices[static_cast<std::size_t>(r)])] * gravity;
   }
   for (const auto& [t, rows] : s.ties) {
     const Tie& tie = body->ties[static_cast<std::size_t>(t)];
@@ -407,14 +469,15 @@ void BlendedSolver::Impl::solve_region(std::size_t index, const StepData& step, 
 
   // Velocity of every local function in rotated axes, then at the region's vertices, back in the world,
   // weighted.
-  s.m.topRows(s.num_unknown) = Eigen::Map<const Points>(s.solution.data(), s.num_unknown, 3);
+  s.velocity.topRows(s.num_unknown) = Eigen::Map<const Points>(s.solution.data(), s.num_unknown, 3);
   for (std::size_t k = static_cast<std::size_t>(s.num_unknown); k < s.functions.size(); ++k) {
-    s.m.row(static_cast<Eigen::Index>(k)) = step.v_known.row(s.functions[k]) * end.rotation;
+    s.velocity.row(static_cast<Eigen::Index>(k)) = step.v_known.row(s.functions[k]) * end.rotation;
   }
   for (std::size_t k = 0; k < s.blended.size(); ++k) {
     Eigen::RowVector3d y = Eigen::RowVector3d::Zero();
     if (s.blended[k] >= 0) {
-      for (RowSparse::InnerIterator it(s.values, s.blended[k]); it; ++it) y += it.value() * s.m.row(it.col());
+      for (RowSparse::InnerIterator it(s.values, s.blended[k]); it; ++it)
+        y += it.value() * s.velocity.row(it.col());
     }
     s.result.row(static_cast<Eigen::Index>(k)) = region.weights[k] * (y * end.rotation.transpose());
   }
@@ -437,19 +500,22 @@ Points known_velocity(const Body& body, const State& state, const Points& x_h, c
       turn[f] = poses.stage->frames[f].rotation * now.rotation.transpose();
       if (poses.before != nullptr) backward[f] = poses.before->frames[f].from_rest * now.to_rest;
     }
-    tbb::parallel_for(0, body.mesh.num_vertices(), [&](int a) {
-      const Eigen::Vector3d x = state.x.row(a).transpose();
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
-        const auto f = static_cast<std::size_t>(it.col());
-        Eigen::Vector3d velocity = (forward[f] * x - x) / elapsed;
-        if (poses.before != nullptr) {
-          velocity += turn[f] * (state.v.row(a).transpose() - (x - backward[f] * x) / past_h);
-        }
-        sum += it.value() * velocity;
-      }
-      v.row(a) = sum.transpose();
-    });
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, body.mesh.num_vertices(), 256), [&](const tbb::blocked_range<int>& range) {
+          for (int a = range.begin(); a != range.end(); ++a) {
+            const Eigen::Vector3d x = state.x.row(a).transpose();
+            Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+            for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+              const auto f = static_cast<std::size_t>(it.col());
+              Eigen::Vector3d velocity = (forward[f] * x - x) / elapsed;
+              if (poses.before != nullptr) {
+                velocity += turn[f] * (state.v.row(a).transpose() - (x - backward[f] * x) / past_h);
+              }
+              sum += it.value() * velocity;
+            }
+            v.row(a) = sum.transpose();
+          }
+        });
   }
   for (const BoneVertex& bone : body.bones.vertices) {
     v.row(bone.vertex) =
@@ -488,8 +554,15 @@ lattice::Points BlendedSolver::stage_velocity(const State& state, const Points& 
   if (use_past) coordinates.analyse(state.x_past, step.x_past);
 
   const std::vector<Factor>& factors = impl_->factors.at({h, integrator});
-  tbb::parallel_for(std::size_t{0}, impl_->systems.size(), [&](std::size_t i) {
-    if (impl_->systems[i].num_unknown > 0) impl_->solve_region(i, step, factors[i]);
+  std::vector<RegionSystem>& systems = impl_->systems;
+  tbb::parallel_for(std::size_t{0}, systems.size(),
+                    [&](std::size_t i) { impl_->gather_inputs(systems[i], step); });
+  tbb::parallel_for(tbb::blocked_range<int>(0, body.mesh.num_vertices(), 64),
+                    [&](const tbb::blocked_range<int>& range) {
+                      for (int a = range.begin(); a != range.end(); ++a) impl_->apply_matrices(a);
+                    });
+  tbb::parallel_for(std::size_t{0}, systems.size(), [&](std::size_t i) {
+    if (systems[i].num_unknown > 0) impl_->solve_region(systems[i], step, factors[i]);
   });
   // Blend in region order: the same bits for any number of threads.
   Points v = Points::Zero(body.mesh.num_vertices(), 3);

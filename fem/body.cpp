@@ -64,6 +64,27 @@ void check_orientation(const lattice::LeafMesh& mesh) {
   }
 }
 
+/// A bone that runs outside the flesh still needs its vertices: keeps the cells round chain vertices that
+/// would lose all of theirs.
+void rescue_bones(const lattice::ControlLattice& lattice, std::vector<std::uint8_t>& keep_coarse) {
+  const auto& cells = lattice.complex.cells;
+  std::vector<std::uint8_t> has_cell(static_cast<std::size_t>(lattice.complex.points.rows()), 0);
+  const auto visit = [&](std::size_t c, const auto& action) {
+    for (int k = 0; k < num_corners(cells[c].type); ++k)
+      action(static_cast<std::size_t>(cells[c].vertices[static_cast<std::size_t>(k)]));
+  };
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    if (keep_coarse[c]) visit(c, [&](std::size_t v) { has_cell[v] = 1; });
+  }
+  std::vector<std::uint8_t> rescued(has_cell.size(), 0);
+  for (const auto& bone : lattice.bones) {
+    for (int v : bone.chain) rescued[static_cast<std::size_t>(v)] = !has_cell[static_cast<std::size_t>(v)];
+  }
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    visit(c, [&](std::size_t v) { keep_coarse[c] |= rescued[v]; });
+  }
+}
+
 }  // namespace
 
 void BodyOptions::validate() const {
@@ -90,23 +111,15 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   lattice::Embedding skin = lattice::embed(mesh, input.skin.points);
   std::vector<lattice::FillFractions> fill = lattice::fill_fractions(mesh, query, options.shell * h);
   std::vector<std::uint8_t> keep = lattice::filled_cells(fill, skin.cell);
-  // A bone that runs outside the flesh still needs its vertices: keep the cells round chain vertices that
-  // would lose all of theirs.
-  std::vector<std::uint8_t> has_cell(static_cast<std::size_t>(mesh.num_vertices()), 0);
-  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
-    for (int a : mesh.cells[c])
-      has_cell[static_cast<std::size_t>(a)] = has_cell[static_cast<std::size_t>(a)] || keep[c];
-  }
-  std::vector<std::uint8_t> rescue(has_cell.size(), 0);
-  for (const auto& bone : input.lattice.bones) {
-    for (int v : bone.chain) {
-      const auto leaf = static_cast<std::size_t>(mesh.leaf_of_vertex[static_cast<std::size_t>(v)]);
-      rescue[leaf] = !has_cell[leaf];
-    }
-  }
-  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
-    for (int a : mesh.cells[c]) keep[c] = keep[c] || rescue[static_cast<std::size_t>(a)];
-  }
+  // A coarse cell stays or goes as a whole: were only some of its children kept, a level-0 hat could reach
+  // kept cells without having its own vertex there, and it would be a combination of details.
+  std::vector<std::uint8_t> keep_coarse(hierarchy.coarse().cells.size(), 0);
+  const auto coarse_of = [&](std::size_t c) {
+    return static_cast<std::size_t>(hierarchy.coarse_cell(mesh.hex[c] >> (3 * (mesh.level[c] - 1))));
+  };
+  for (std::size_t c = 0; c < keep.size(); ++c) keep_coarse[coarse_of(c)] |= keep[c];
+  rescue_bones(input.lattice, keep_coarse);
+  for (std::size_t c = 0; c < keep.size(); ++c) keep[c] = keep_coarse[coarse_of(c)];
   std::vector<lattice::FillFractions> kept_fill;
   for (std::size_t c = 0; c < keep.size(); ++c) {
     if (keep[c]) kept_fill.push_back(fill[c]);
@@ -131,8 +144,8 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
 
   std::vector<PosedFrames> posed;
   for (const auto& pose : input.poses) posed.push_back(pose_frames(tree, pose, 0.0));
-  std::vector<Region> regions =
-      make_regions(input.lattice, tree, radii, mesh, weights, largest_bends(tree, posed), options.regions);
+  std::vector<Region> regions = make_regions(input.lattice, tree, radii, mesh, weights,
+                                             judge_bends(tree, posed, options.regions), options.regions);
 
   Body body{input.lattice,
             std::move(hierarchy),

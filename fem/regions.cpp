@@ -6,16 +6,25 @@
 
 namespace sinew::fem {
 
-std::vector<double> largest_bends(const FrameTree& tree, const std::vector<PosedFrames>& poses) {
-  std::vector<double> bends(tree.frames.size(), 0.0);
-  for (std::size_t f = 0; f < tree.frames.size(); ++f) {
-    const int parent = tree.frames[f].parent;
-    if (parent < 0) continue;
+FrameBends judge_bends(const FrameTree& tree, const std::vector<PosedFrames>& poses,
+                       const RegionOptions& options) {
+  const auto largest_angle = [&](int a, int b) {
+    double largest = 0.0;
     for (const PosedFrames& pose : poses) {
-      const Eigen::Matrix3d relative =
-          pose.frames[static_cast<std::size_t>(parent)].rotation.transpose() * pose.frames[f].rotation;
-      bends[f] = std::max(bends[f], Eigen::AngleAxisd(relative).angle());
+      const Eigen::Matrix3d relative = pose.frames[static_cast<std::size_t>(a)].rotation.transpose() *
+                                       pose.frames[static_cast<std::size_t>(b)].rotation;
+      largest = std::max(largest, Eigen::AngleAxisd(relative).angle());
     }
+    return largest;
+  };
+  FrameBends bends;
+  for (int f = 0; f < tree.num_frames(); ++f) {
+    const int parent = tree.frames[static_cast<std::size_t>(f)].parent;
+    const int above = parent < 0 ? f : bends.leader[static_cast<std::size_t>(parent)];
+    const double angle = parent < 0 ? 0.0 : largest_angle(above, f);
+    const bool merges = parent >= 0 && angle <= options.merge_angle;
+    bends.leader.push_back(merges ? above : f);
+    bends.bend.push_back(merges ? 0.0 : angle);
   }
   return bends;
 }
@@ -124,8 +133,9 @@ Shares shares_of(const Joint& joint, const Eigen::Vector3d& x, bool owned_by_par
 
 std::vector<Region> make_regions(const lattice::ControlLattice& lattice, const FrameTree& tree,
                                  const LimbRadii& radii, const lattice::LeafMesh& mesh,
-                                 const FrameWeights& weights, const std::vector<double>& bends,
+                                 const FrameWeights& weights, const FrameBends& bends,
                                  const RegionOptions& options) {
+  const auto leader = [&](int f) { return bends.leader[static_cast<std::size_t>(f)]; };
   std::vector<Region> regions;
   for (int f = 0; f < tree.num_frames(); ++f) {
     regions.push_back({f, f, 0.0, tree.frames[static_cast<std::size_t>(f)].origin_rest, {}, {}});
@@ -134,13 +144,14 @@ std::vector<Region> make_regions(const lattice::ControlLattice& lattice, const F
   std::vector<std::vector<int>> joints_of_frame(tree.frames.size());
   for (int f = 0; options.joints && f < tree.num_frames(); ++f) {
     if (tree.frames[static_cast<std::size_t>(f)].parent < 0) continue;
+    if (bends.bend[static_cast<std::size_t>(f)] <= options.joint_angle) continue;
     Joint joint = make_joint(lattice, tree, radii, f);
     // The region count is a property of the run, not of the instant, so that weights never jump.
-    joint.num_regions = bends[static_cast<std::size_t>(f)] > 0.5 * std::numbers::pi ? 2 : 1;
+    joint.num_regions = bends.bend[static_cast<std::size_t>(f)] > 0.5 * std::numbers::pi ? 2 : 1;
     joint.first_region = static_cast<int>(regions.size());
     for (int k = 0; k < joint.num_regions; ++k) {
       const double t = joint.num_regions == 1 ? 0.5 : (k + 1) / 3.0;
-      regions.push_back({joint.parent, joint.child, t, joint.position, {}, {}});
+      regions.push_back({leader(joint.parent), leader(joint.child), t, joint.position, {}, {}});
     }
     joints_of_frame[static_cast<std::size_t>(joint.parent)].push_back(static_cast<int>(joints.size()));
     joints_of_frame[static_cast<std::size_t>(joint.child)].push_back(static_cast<int>(joints.size()));
@@ -158,13 +169,13 @@ std::vector<Region> make_regions(const lattice::ControlLattice& lattice, const F
       const bool parent = joint.parent == owner;
       const Shares shares = shares_of(joint, mesh.points.row(a).transpose(), parent);
       own *= parent ? shares.parent : shares.child;
-      w[static_cast<std::size_t>(parent ? joint.child : joint.parent)] +=
+      w[static_cast<std::size_t>(leader(parent ? joint.child : joint.parent))] +=
           parent ? shares.child : shares.parent;
       for (int k = 0; k < joint.num_regions; ++k) {
         w[static_cast<std::size_t>(joint.first_region + k)] += shares.joints[static_cast<std::size_t>(k)];
       }
     }
-    w[static_cast<std::size_t>(owner)] += own;
+    w[static_cast<std::size_t>(leader(owner))] += own;
     double sum = 0.0;
     for (double& x : w) {
       if (x < 1e-9) x = 0.0;

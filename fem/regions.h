@@ -1,11 +1,14 @@
 #pragma once
 
+#include <numbers>
 #include <vector>
 
 #include "fem/frame_weights.h"
 #include "fem/limb_radius.h"
 
-/// Regions in which the flesh is linearised: one per frame and one (or two) per joint (DESIGN section 6).
+/// Regions in which the flesh is linearised: one per frame and one (or two) per joint (DESIGN section 6). A
+/// scene pays only for what it models: frames that move as one share a region, and joints that hardly bend
+/// have none.
 namespace sinew::fem {
 
 /// A region: its frame is slerp(R_first, R_second, t) about its origin; a frame's own region has first ==
@@ -26,20 +29,34 @@ struct RegionTransform {
   Eigen::Affine3d from_rest = Eigen::Affine3d::Identity();  ///< T_i; its linear part carries animated scale.
 };
 
-/// Angle [rad] by which each frame turns against its parent's, largest over `poses`; 0 for frames without
-/// parent.
-std::vector<double> largest_bends(const FrameTree& tree, const std::vector<PosedFrames>& poses);
-
 struct RegionOptions {
   /// Joint regions between parent and child frames; without them the error at a 120-degree elbow grows
   /// from 2.8 to 7.1 % of the length.
   bool joints = true;
+  /// A frame that never turns more than this against the leader of its parent's flesh shares the leader's
+  /// region [rad];
+  /// >= 0. A linear body that is off by 10 degrees strains by 1 - cos(10 deg) = 1.5 % at most.
+  double merge_angle = 10.0 * std::numbers::pi / 180.0;
+  /// Two regions that never bend more than this against each other need no joint region [rad]: the same angle
+  /// lies between neighbouring frames of a 60-degree bend that has one.
+  double joint_angle = 30.0 * std::numbers::pi / 180.0;
 };
 
-/// Regions with at least one vertex. `bends`: per frame, from largest_bends, judged once per run.
+/// How frames turn against each other over a run: judged once, so that weights never jump.
+struct FrameBends {
+  /// Frame in whose rotation the flesh of a frame is linearised: itself, or an ancestor that it hardly turns
+  /// against.
+  std::vector<int> leader;
+  /// Largest angle between the leaders of a frame and of its parent [rad]; 0 for frames without parent.
+  std::vector<double> bend;
+};
+FrameBends judge_bends(const FrameTree& tree, const std::vector<PosedFrames>& poses,
+                       const RegionOptions& options = {});
+
+/// Regions with at least one vertex.
 std::vector<Region> make_regions(const lattice::ControlLattice& lattice, const FrameTree& tree,
                                  const LimbRadii& radii, const lattice::LeafMesh& mesh,
-                                 const FrameWeights& weights, const std::vector<double>& bends,
+                                 const FrameWeights& weights, const FrameBends& bends,
                                  const RegionOptions& options = {});
 
 RegionTransform transform_of(const Region& region, const PosedFrames& posed);
