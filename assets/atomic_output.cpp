@@ -1,0 +1,238 @@
+#include "assets/atomic_output.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include "assets/error.h"
+
+namespace sinew::assets {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Ending of the name under which an earlier run waits to be removed, where a file system cannot swap names.
+constexpr const char* kAside = "-replaced";
+
+[[noreturn]] void fail(const std::string& shown, const std::string& what, int error) {
+  throw IoError(shown + ": " + what + ": " + std::strerror(error));
+}
+
+/// An open file descriptor.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
+
+ private:
+  int fd_;
+};
+
+/// Absolute, without a slash at its end; the name itself is not followed if it is a symbolic link to nowhere.
+fs::path absolute_target(const std::string& shown) {
+  if (shown.empty()) throw IoError("the output path is empty");
+  fs::path path = fs::absolute(shown).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  if (!path.has_filename()) throw IoError(shown + ": cannot be replaced by an output");
+  std::error_code error;
+  const bool is_link = fs::is_symlink(path, error);
+  if (is_link) {
+    fs::path real = fs::canonical(path, error);
+    if (error) fail(shown, "a symbolic link that leads nowhere", error.value());
+    return real;
+  }
+  return path;
+}
+
+std::string partial_prefix(const fs::path& target) {
+  return fmt::format(".{}.partial-", target.filename().string());
+}
+
+/// Opens `path` and takes its lock without waiting; -1 where another process has it or it is gone.
+int open_locked(const fs::path& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return -1;
+  if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
+  ::close(fd);
+  return -1;
+}
+
+/// Removes what dead processes left of this output. The lock, not the process number, tells who lives:
+/// numbers are used again. Throws BusyError where somebody else is at it.
+void clear_partials(const fs::path& target, const std::string& shown) {
+  const std::string prefix = partial_prefix(target);
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (fs::directory_iterator it(target.parent_path(), error), end; !error && it != end; it.increment(error))
+    if (it->path().filename().string().rfind(prefix, 0) == 0) found.push_back(it->path());
+  if (error) fail(shown, "cannot read folder '" + target.parent_path().string() + "'", error.value());
+  for (const fs::path& partial : found) {
+    const Descriptor lock(open_locked(partial));
+    if (lock.get() < 0 && fs::exists(partial, error))
+      throw BusyError(shown + ": process " + partial.filename().string().substr(prefix.size()) +
+                      " is writing it; hint: wait for it or choose another output");
+    fs::remove_all(partial, error);
+    if (error)
+      fail(shown, "cannot remove '" + partial.string() + "', which a stopped run left", error.value());
+  }
+}
+
+/// Holds the lock of the parent folder, so that of two processes that start together one sees the other's
+/// sibling.
+Descriptor lock_parent(const fs::path& target, const std::string& shown) {
+  const fs::path parent = target.parent_path();
+  Descriptor fd(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() < 0) fail(shown, "cannot open folder '" + parent.string() + "'", errno);
+  if (::access(parent.c_str(), W_OK | X_OK) != 0)
+    fail(shown, "cannot write in folder '" + parent.string() + "'", errno);
+  while (::flock(fd.get(), LOCK_EX) != 0)
+    if (errno != EINTR) fail(shown, "cannot lock folder '" + parent.string() + "'", errno);
+  return Descriptor(fd.release());
+}
+
+void sync_path(const fs::path& path, const std::string& shown) {
+  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  // Some file systems have no fsync for folders and say EINVAL.
+  if (fd.get() < 0 || (::fsync(fd.get()) != 0 && errno != EINVAL))
+    fail(shown, "cannot bring '" + path.filename().string() + "' to the disk", errno);
+}
+
+void write_all(int fd, std::string_view bytes, const std::string& shown) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail(shown, fmt::format("cannot be written, {} bytes missing", bytes.size()), errno);
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void check_replaceable(const fs::path& target, const std::string& shown, Overwrite overwrite,
+                       const std::vector<std::string>& own_names) {
+  std::error_code error;
+  const fs::file_status status = fs::status(target, error);
+  if (!fs::exists(status)) {
+    if (error && error != std::errc::no_such_file_or_directory)
+      fail(shown, "cannot be reached", error.value());
+    return;
+  }
+  if (!fs::is_directory(status)) throw IoError(shown + ": is a file, expected a folder or a new name");
+  std::vector<std::string> names;
+  for (fs::directory_iterator it(target, error), end; !error && it != end; it.increment(error))
+    names.push_back(it->path().filename().string());
+  if (error) fail(shown, "cannot be read", error.value());
+  if (names.empty()) return;
+  std::sort(names.begin(), names.end());
+  if (overwrite == Overwrite::Refuse)
+    throw BusyError(
+        fmt::format("{}: is not empty, it holds '{}'{}; hint: --overwrite replaces an earlier run", shown,
+                    names.front(), names.size() > 1 ? fmt::format(" and {} more", names.size() - 1) : ""));
+  for (const std::string& name : names)
+    if (std::find(own_names.begin(), own_names.end(), name) == own_names.end())
+      throw BusyError(
+          shown + ": holds '" + name +
+          "', which is not of an earlier run and would be lost; hint: move it away or choose another output");
+}
+
+/// Swaps two names in one step where the file system can; otherwise moves the old one aside first.
+void put_in_place(const fs::path& partial, const fs::path& target, const std::string& shown) {
+  if (::renameat2(AT_FDCWD, partial.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) return;
+  if (errno == ENOENT) {  // nothing to swap with
+    if (::rename(partial.c_str(), target.c_str()) == 0) return;
+    fail(shown, "cannot be put in place", errno);
+  }
+  if (errno != EINVAL && errno != ENOSYS) fail(shown, "cannot be put in place", errno);
+  // Under a name of the same kind, so that the next run removes it if this one is killed before it does.
+  const fs::path aside = partial.string() + kAside;
+  if (::rename(target.c_str(), aside.c_str()) != 0) fail(shown, "cannot be moved aside", errno);
+  if (::rename(partial.c_str(), target.c_str()) != 0) {
+    const int error = errno;
+    ::rename(aside.c_str(), target.c_str());
+    fail(shown, "cannot be put in place", error);
+  }
+  if (::rename(aside.c_str(), partial.c_str()) != 0) fail(shown, "cannot remove the earlier run", errno);
+}
+
+}  // namespace
+
+void write_file(const std::string& path, std::string_view bytes, Overwrite overwrite) {
+  const fs::path target = absolute_target(path);
+  const fs::path partial = target.parent_path() / (partial_prefix(target) + std::to_string(::getpid()));
+  const Descriptor parent = lock_parent(target, path);
+  std::error_code error;
+  if (fs::is_directory(target, error)) throw IoError(path + ": is a folder, expected a file or a new name");
+  if (overwrite == Overwrite::Refuse && fs::exists(target, error))
+    throw BusyError(path + ": exists already; hint: --overwrite replaces it");
+  clear_partials(target, path);
+  const Descriptor file(::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (file.get() < 0) fail(path, "cannot be created", errno);
+  try {
+    ::flock(file.get(), LOCK_EX | LOCK_NB);
+    write_all(file.get(), bytes, path);
+    if (::fsync(file.get()) != 0) fail(path, "cannot be brought to the disk", errno);
+    if (::rename(partial.c_str(), target.c_str()) != 0) fail(path, "cannot be put in place", errno);
+  } catch (...) {
+    ::unlink(partial.c_str());
+    throw;
+  }
+  sync_path(target.parent_path(), path);
+}
+
+OutputDirectory::OutputDirectory(const std::string& path, Overwrite overwrite,
+                                 const std::vector<std::string>& own_names)
+    : shown_(path), overwrite_(overwrite), own_names_(own_names) {
+  const fs::path target = absolute_target(path);
+  const Descriptor parent = lock_parent(target, path);
+  check_replaceable(target, path, overwrite, own_names);
+  clear_partials(target, path);
+  const fs::path partial = target.parent_path() / (partial_prefix(target) + std::to_string(::getpid()));
+  if (::mkdir(partial.c_str(), 0777) != 0) fail(path, "cannot be created", errno);
+  target_ = target.string();
+  partial_ = partial.string();
+  lock_ = open_locked(partial);
+  if (lock_ < 0) {
+    ::rmdir(partial.c_str());
+    throw IoError(path + ": cannot lock '" + partial_ + "'");
+  }
+}
+
+OutputDirectory::~OutputDirectory() {
+  // The lock goes last: until then nobody takes the sibling for one that was left behind.
+  std::error_code ignored;
+  if (!partial_.empty()) fs::remove_all(partial_, ignored);
+  if (lock_ >= 0) ::close(lock_);
+}
+
+void OutputDirectory::commit() {
+  const fs::path target(target_), partial(partial_);
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(partial, error), end; !error && it != end; it.increment(error))
+    sync_path(it->path(), shown_);
+  if (error) fail(shown_, "cannot be read back", error.value());
+  sync_path(partial, shown_);
+  const Descriptor parent = lock_parent(target, shown_);
+  check_replaceable(target, shown_, overwrite_, own_names_);  // it may have been filled since we started
+  put_in_place(partial, target, shown_);
+  sync_path(target.parent_path(), shown_);
+  // Now the sibling is the earlier run, if there was one.
+  fs::remove_all(partial, error);
+  if (error) fail(shown_, "the new output is in place, but the earlier one cannot be removed", error.value());
+  partial_.clear();
+}
+
+}  // namespace sinew::assets
