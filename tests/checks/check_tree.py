@@ -36,6 +36,7 @@ LIBRARIES = {
     "CGAL/": {"lattice"},
     "nanoflann.hpp": {"lattice", "fem", "assets"},
     "cholmod": {"fem"},
+    "omp.h": {"fem"},
     "embree3/": {"lattice", "assets"},
     "assimp/": {"assets"},
     "tiny_gltf.h": {"assets"},

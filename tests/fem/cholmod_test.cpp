@@ -3,15 +3,22 @@
 
 #include <fstream>
 #include <string>
+#include <vector>
 
+#include <Eigen/SparseCore>
 #include <cholmod.h>
 #include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "fem/factor.h"
 
 extern "C" {
 char* openblas_get_config();
 int openblas_get_parallel();  // 0: compiled without threads
 }
 
+namespace sinew {
 namespace {
 
 TEST(CholmodLibrary, RunsOnSerialOpenBlas) {
@@ -79,4 +86,77 @@ TEST(CholmodLibrary, SolvesSecondDifferencesSupernodallyInMetisOrder) {
   cholmod_finish(&common);
 }
 
+/// (n^3 unknowns) Seven-point Laplacian plus the identity on a grid of n x n x n points.
+Eigen::SparseMatrix<double> grid_matrix(int n) {
+  std::vector<Eigen::Triplet<double>> entries;
+  const auto index = [n](int x, int y, int z) { return (x * n + y) * n + z; };
+  const auto couple = [&](int a, int b) {
+    entries.emplace_back(a, b, -1.0);
+    entries.emplace_back(b, a, -1.0);
+  };
+  for (int x = 0; x < n; ++x) {
+    for (int y = 0; y < n; ++y) {
+      for (int z = 0; z < n; ++z) {
+        entries.emplace_back(index(x, y, z), index(x, y, z), 7.0);
+        if (x + 1 < n) couple(index(x, y, z), index(x + 1, y, z));
+        if (y + 1 < n) couple(index(x, y, z), index(x, y + 1, z));
+        if (z + 1 < n) couple(index(x, y, z), index(x, y, z + 1));
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> matrix(n * n * n, n * n * n);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+/// Factors and solves with a right side of ones.
+Eigen::VectorXd solve_ones(const Eigen::SparseMatrix<double>& matrix) {
+  fem::Factor factor;
+  const auto report = factor.factorise(matrix);
+  EXPECT_TRUE(report.ok) << report.message;
+  Eigen::VectorXd x = Eigen::VectorXd::Ones(matrix.rows());
+  Eigen::VectorXd workspace;
+  factor.solve(x, workspace);
+  return x;
+}
+
+// METIS draws its random numbers from the C library's one generator, which threads that order at the same
+// time would share. Several matrices of several sizes, as regions are; many rounds, as the clash is a matter
+// of chance.
+TEST(FactorsInParallel, HaveTheSameBitsAsOneAfterTheOther) {
+  std::vector<Eigen::SparseMatrix<double>> matrices;
+  for (int i = 0; i < 8; ++i) matrices.push_back(grid_matrix(9 + i % 4));
+  std::vector<Eigen::VectorXd> expected;
+  for (const auto& matrix : matrices) expected.push_back(solve_ones(matrix));
+  for (int round = 0; round < 10; ++round) {
+    std::vector<Eigen::VectorXd> solutions(matrices.size());
+    tbb::task_arena(4).execute([&] {
+      tbb::parallel_for(std::size_t{0}, matrices.size(),
+                        [&](std::size_t i) { solutions[i] = solve_ones(matrices[i]); });
+    });
+    for (std::size_t i = 0; i < matrices.size(); ++i) {
+      EXPECT_TRUE(solutions[i] == expected[i]) << "matrix " << i << ", round " << round << ", difference "
+                                               << (solutions[i] - expected[i]).cwiseAbs().maxCoeff();
+    }
+  }
+}
+
+int num_threads_of_process() {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  int threads = -1;
+  while (status >> word) {
+    if (word == "Threads:") status >> threads;
+  }
+  return threads;
+}
+
+TEST(Factor, StartsNoThreadsOfItsOwn) {
+  const int before = num_threads_of_process();
+  ASSERT_GT(before, 0);
+  solve_ones(grid_matrix(20));  // supernodes of several hundred rows, where CHOLMOD's loops become parallel
+  EXPECT_EQ(num_threads_of_process(), before);
+}
+
 }  // namespace
+}  // namespace sinew
