@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -17,6 +18,9 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include "assets/detail/fbx_bind.h"
+#include "assets/detail/fbx_document.h"
+#include "assets/detail/fbx_inheritance.h"
 #include "assets/detail/file_bytes.h"
 #include "assets/detail/text.h"
 #include "assets/detail/transforms.h"
@@ -356,6 +360,22 @@ std::string one_line(std::string message) {
   return printable(message);
 }
 
+/// What assimp drops from FBX files is read from the file itself.
+void add_fbx_facts(const std::string& file, ImportedScene& scene) {
+  FbxFacts facts;
+  try {
+    facts = read_fbx_facts(read_whole(file));
+  } catch (const std::runtime_error& e) {
+    scene.findings.push_back(
+        {Finding::Severity::Warning, "fbx-not-scanned", "",
+         std::string("scale inheritance and bind matrices could not be checked: ") + e.what(),
+         "export the file again"});
+    return;
+  }
+  take_fbx_bind_matrices(file, facts.clusters, scene);
+  apply_fbx_inheritance(facts.inherit, scene);
+}
+
 }  // namespace
 
 ImportedScene read_with_assimp(const std::string& file) {
@@ -376,7 +396,9 @@ ImportedScene read_with_assimp(const std::string& file) {
     throw InputError(file, "importer: cannot be read: " + (reason.empty() ? "no reason given" : reason) +
                                "; hint: open the file in Blender and export it as .glb");
   }
-  return AssimpReader(file, *source).run();
+  ImportedScene scene = AssimpReader(file, *source).run();
+  if (scene.format == "FBX") add_fbx_facts(file, scene);
+  return scene;
 }
 
 }  // namespace sinew::assets::detail

@@ -55,6 +55,9 @@ class Checker {
              std::to_string(skin.joint_from_mesh.size()) + ", expected " +
              std::to_string(skin.joints.size()));
     }
+    if (skin.world_from_mesh && !skin.world_from_mesh->matrix().allFinite()) {
+      refuse(thing + ": bind pose of the mesh is not a number, got nan or inf, expected finite numbers");
+    }
     for (std::size_t j = 0; j < skin.joints.size(); ++j) {
       if (!in_range(skin.joints[j], scene_.nodes.size())) {
         refuse(thing + ": joint " + std::to_string(j) + " is not a node, got " +

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,12 +22,17 @@ struct ImportedNode {
   Eigen::Affine3d parent_from_node = Eigen::Affine3d::Identity();
   /// The same in parts (its closest parts where the file stores a shear).
   skeleton::LocalTransform local;
+  /// Put in by a reader above one child to hold part of that child's transform: at rest it stands where the
+  /// child stands.
+  bool helper = false;
 };
 
 /// Joints with their inverse bind matrices.
 struct ImportedSkin {
   std::vector<int> joints;                       ///< nodes.
   std::vector<Eigen::Affine3d> joint_from_mesh;  ///< one per joint.
+  /// Where the mesh stood when it was bound, in world coordinates, where the file tells.
+  std::optional<Eigen::Affine3d> world_from_mesh;
 };
 
 struct ImportedMesh {

@@ -100,15 +100,15 @@ void bind_coincident_copies(Rig& rig) {
       weights.push_back(weights_at(skin, closest.triangle, closest.point));
     }
     if (mean_distance > kCopyDistance * diagonal) continue;
-    part.role = PartRole::Skinned;
+    part.role = PartRole::Simulated;
     part.joint = -1;
     part.weights = std::move(weights);
     rig.findings.push_back(
         {Finding::Severity::Warning, "part-follows-skin", part.name,
          "the part has no skin weights but covers the skinned body (" +
              number(100.0 * mean_distance / diagonal) +
-             " % of its diagonal away on average); it follows the body's skin and is not simulated",
-         "bind it to the skeleton if its flesh should move, or leave it out of the file"});
+             " % of its diagonal away on average); it was given the body's weights and moves with its flesh",
+         "bind it to the skeleton yourself, or leave it out of the file if it is not meant to be seen"});
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -20,9 +21,11 @@ constexpr double kRestTolerance = 1e-4;
 /// Node pose and bind pose count as the same below this share of a mesh's diagonal: bind matrices are floats
 /// that went through several programs (1e-5 is usual), while another pose moves joints by many per cent.
 constexpr double kSamePose = 1e-3;
-/// A character that stands within this share of its diagonal from where it was bound is left where it was
-/// bound, so that its feet stay on the ground it was modelled on.
-constexpr double kLeaveInPlace = 0.15;
+/// Without a word of the file, a character that stands within this share of its diagonal from where it was
+/// bound is left where it was bound, so that its feet stay on the ground it was modelled on.
+constexpr double kLeaveInPlace = 0.5;
+/// Joints whose scales differ by more are stretched by the pose; rounding stays a thousand times below.
+constexpr double kStretch = 0.01;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -127,16 +130,31 @@ class RestFinder {
     if (maps.empty()) return Eigen::Affine3d::Identity();
     const auto& heaviest = *std::max_element(
         maps.begin(), maps.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-    const double scale = median_scale(maps);
+    const double scale = character_scale(maps);
     const double size = scale * boxes_[k].diagonal().norm();
     const bool same_pose = std::all_of(maps.begin(), maps.end(), [&](const auto& map) {
       return distance(map.first, heaviest.first, boxes_[k]) <= kSamePose * size;
     });
     if (same_pose) return heaviest.first;
-    return similarity(maps, scale, k);
+    const Eigen::Affine3d guess = similarity(maps, scale, k);
+    const std::optional<Eigen::Affine3d>& bound = scene_.skins[k].world_from_mesh;
+    return bound && stands_like(*bound, guess) ? *bound : guess;
   }
 
-  static double median_scale(const std::vector<std::pair<Eigen::Affine3d, double>>& maps) {
+  /// The file's word for where the mesh was bound counts where it agrees with the guess in size and rough
+  /// direction; it may be a leftover.
+  static bool stands_like(const Eigen::Affine3d& bound, const Eigen::Affine3d& guess) {
+    if (!usable(bound)) return false;
+    const Eigen::Matrix3d change = guess.linear().inverse() * bound.linear();
+    const double scale = std::cbrt(change.determinant());
+    if (!(scale > 0.5 && scale < 2.0)) return false;
+    // trace = 1 + 2 cos(angle); 45 degrees is half way to the next turn of axes.
+    return nearest_orthogonal(change).trace() > 1.0 + 2.0 * std::cos(0.25 * std::numbers::pi);
+  }
+
+  /// Scale from mesh to world: the joints' median. Where joints are stretched (their scales disagree) and it
+  /// is near 1, the stretch is part of the pose and the mesh keeps its size.
+  static double character_scale(const std::vector<std::pair<Eigen::Affine3d, double>>& maps) {
     std::vector<std::pair<double, double>> scales;
     double total = 0.0;
     for (const auto& [map, weight] : maps) {
@@ -144,12 +162,17 @@ class RestFinder {
       total += weight;
     }
     std::sort(scales.begin(), scales.end());
-    double below = 0.0;
-    for (const auto& [scale, weight] : scales) {
-      below += weight;
-      if (below >= 0.5 * total) return scale;
-    }
-    return scales.back().first;
+    const auto quantile = [&](double share) {
+      double below = 0.0;
+      for (const auto& [scale, weight] : scales) {
+        below += weight;
+        if (below >= share * total) return scale;
+      }
+      return scales.back().first;
+    };
+    const double median = quantile(0.5);
+    const bool stretched = quantile(0.9) > (1.0 + kStretch) * quantile(0.1);
+    return stretched && median > 0.5 && median < 2.0 ? 1.0 : median;
   }
 
   Eigen::Affine3d similarity(const std::vector<std::pair<Eigen::Affine3d, double>>& maps, double scale,
@@ -229,8 +252,19 @@ class RestFinder {
     return local.matrix();
   }
 
+  /// Gives the parent of a placed node the place from which its child is where it is.
+  void hang_on_child(std::size_t child) {
+    const int parent = scene_.nodes[child].parent;
+    result_.rest_from_node[at(parent)] = result_.rest_from_node[child] * invertible_local(child).inverse();
+    resolved_[at(parent)] = true;
+  }
+
   void complete_tree() {
     const std::size_t n = scene_.nodes.size();
+    for (std::size_t i = n; i-- > 0;) {
+      const int parent = scene_.nodes[i].parent;
+      if (resolved_[i] && parent >= 0 && scene_.nodes[at(parent)].helper) hang_on_child(i);
+    }
     const auto hang_on_parents = [&] {
       for (std::size_t i = 0; i < n; ++i) {
         const int parent = scene_.nodes[i].parent;
@@ -240,13 +274,8 @@ class RestFinder {
       }
     };
     hang_on_parents();
-    for (std::size_t i = n; i-- > 0;) {
-      const int parent = scene_.nodes[i].parent;
-      if (!resolved_[i] || parent < 0 || resolved_[at(parent)]) continue;
-      result_.rest_from_node[at(parent)] = result_.rest_from_node[i] * invertible_local(i).inverse();
-      resolved_[at(parent)] = true;
-    }
-    hang_on_parents();
+    // What stands above the skin (armatures, groups) is part of the scene, not of the bind pose: it rests
+    // where it is, and so does what hangs on it alone.
     for (std::size_t i = 0; i < n; ++i) {
       if (resolved_[i]) continue;
       const int parent = scene_.nodes[i].parent;

@@ -263,7 +263,10 @@ class RigBuilder {
     std::set<double> keys;
     std::size_t num_dropped = 0;
     for (skeleton::Channel& source : scene_.clips[c].channels) {
-      const bool is_root = scene_.nodes[at(source.joint)].parent < 0;
+      const ImportedNode& node = scene_.nodes[at(source.joint)];
+      const bool is_root = node.parent < 0;
+      // Readers sample what they compute for helpers; only the file's own keys count.
+      const bool sampled = node.helper || (!is_root && scene_.nodes[at(node.parent)].helper);
       source.joint = joint_of_node_[at(source.joint)];
       if (source.joint < 0) {
         ++num_dropped;
@@ -271,7 +274,7 @@ class RigBuilder {
       }
       if (source.translation) convert(*source.translation, is_root, keys);
       if (source.rotation) convert(*source.rotation, is_root, clip.name, keys);
-      if (source.scale) keys.insert(source.scale->times.begin(), source.scale->times.end());
+      if (source.scale && !sampled) keys.insert(source.scale->times.begin(), source.scale->times.end());
       clip.channels.push_back(std::move(source));
     }
     clip.num_keys = static_cast<int>(keys.size());

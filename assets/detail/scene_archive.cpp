@@ -178,12 +178,16 @@ void exchange(A& a, ImportedNode& v) {
   exchange(a, v.parent);
   exchange(a, v.parent_from_node);
   exchange(a, v.local);
+  exchange(a, v.helper);
 }
 
 template <typename A>
 void exchange(A& a, ImportedSkin& v) {
   exchange(a, v.joints);
   exchange(a, v.joint_from_mesh);
+  if (!a.presence(v.world_from_mesh.has_value())) return;
+  if (!v.world_from_mesh) v.world_from_mesh.emplace();
+  exchange(a, *v.world_from_mesh);
 }
 
 template <typename A>
