@@ -20,8 +20,7 @@ namespace {
 
 /// One line per subcommand of tools/command.h that exists.
 void add_commands(CLI::App& app, CommandContext& context) {
-  static_cast<void>(app);
-  static_cast<void>(context);
+  add_inspect_command(app, context);
 }
 
 const CLI::App& deepest_parsed(const CLI::App& app) {
