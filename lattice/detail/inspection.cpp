@@ -118,35 +118,6 @@ void find_broken_chains(const ControlLattice& lattice, double size, Inspection& 
   out.quality.exact_chains = out.broken_chains.empty();
 }
 
-void find_floating(const ControlLattice& lattice, const CellLocator& locator, Inspection& out) {
-  const std::vector<std::vector<int>> parts = components(lattice.complex);
-  std::vector<bool> vertex_held(lattice.complex.points.rows(), false);
-  std::vector<bool> cell_held(lattice.complex.cells.size(), false);
-  for (const LatticeBone& bone : lattice.bones) {
-    for (int v : bone.chain) vertex_held[v] = true;
-    if (!bone.soft) continue;
-    for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-      const int cell = locator.find((1.0 - s) * bone.rest_start + s * bone.rest_end, kInsideSlack);
-      if (cell >= 0) cell_held[cell] = true;
-    }
-  }
-  for (const SoftFrame& frame : lattice.soft_frames) {
-    const int cell = locator.find(frame.position, kInsideSlack);
-    if (cell >= 0) cell_held[cell] = true;
-  }
-  out.quality.components = static_cast<int>(parts.size());
-  for (const std::vector<int>& part : parts) {
-    const bool held = std::any_of(part.begin(), part.end(), [&](int c) {
-      const Cell& cell = lattice.complex.cells[c];
-      return cell_held[c] ||
-             std::any_of(cell.vertices.begin(), cell.vertices.begin() + num_corners(cell.type),
-                         [&](int v) { return vertex_held[v]; });
-    });
-    if (!held) out.floating.push_back(part);
-  }
-  out.quality.components_without_bone = static_cast<int>(out.floating.size());
-}
-
 void measure_cells(const CellComplex& complex, Inspection& out) {
   LatticeQuality& q = out.quality;
   q.min_dihedral_degrees = 180.0;
@@ -191,6 +162,34 @@ std::vector<std::vector<int>> components(const CellComplex& complex) {
   return parts;
 }
 
+std::vector<std::vector<int>> floating_components(const ControlLattice& lattice) {
+  const CellLocator locator(lattice.complex);
+  std::vector<bool> vertex_held(lattice.complex.points.rows(), false);
+  std::vector<bool> cell_held(lattice.complex.cells.size(), false);
+  const auto hold = [&](const Vector3d& p) {
+    const int cell = locator.find(p, kInsideSlack);
+    if (cell >= 0) cell_held[cell] = true;
+  };
+  for (const LatticeBone& bone : lattice.bones) {
+    for (int v : bone.chain) vertex_held[v] = true;
+    if (!bone.soft) continue;
+    for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) hold((1.0 - s) * bone.rest_start + s * bone.rest_end);
+  }
+  for (const SoftFrame& frame : lattice.soft_frames) hold(frame.position);
+
+  std::vector<std::vector<int>> floating;
+  for (const std::vector<int>& part : components(lattice.complex)) {
+    const bool held = std::any_of(part.begin(), part.end(), [&](int c) {
+      const Cell& cell = lattice.complex.cells[c];
+      return cell_held[c] ||
+             std::any_of(cell.vertices.begin(), cell.vertices.begin() + num_corners(cell.type),
+                         [&](int v) { return vertex_held[v]; });
+    });
+    if (!held) floating.push_back(part);
+  }
+  return floating;
+}
+
 Inspection inspect(const ControlLattice& lattice, const Surface& skin, const UnitSkin& unit) {
   const CellComplex& complex = lattice.complex;
   if (complex.cells.empty()) throw std::invalid_argument("lattice: there is no cell");
@@ -212,7 +211,9 @@ Inspection inspect(const ControlLattice& lattice, const Surface& skin, const Uni
   out.triangles_outside = find_triangles_outside(complex, skin, vertex_outside, size);
   out.quality.skin_triangles_outside = static_cast<int>(out.triangles_outside.size());
   find_broken_chains(lattice, size, out);
-  find_floating(lattice, locator, out);
+  out.floating = floating_components(lattice);
+  out.quality.components = static_cast<int>(components(complex).size());
+  out.quality.components_without_bone = static_cast<int>(out.floating.size());
   return out;
 }
 

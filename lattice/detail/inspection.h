@@ -26,6 +26,9 @@ Inspection inspect(const ControlLattice& lattice, const Surface& skin, const Uni
 /// The gate on what was found.
 std::vector<GateFailure> judge(const Inspection& inspection, const BuildOptions& options);
 
+/// Components that hold no vertex of a hard bone and no point of a soft bone or frame.
+std::vector<std::vector<int>> floating_components(const ControlLattice& lattice);
+
 /// Connected components of cells (joined by a shared vertex), each in ascending order of cells.
 std::vector<std::vector<int>> components(const CellComplex& complex);
 

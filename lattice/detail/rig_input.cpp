@@ -1,0 +1,55 @@
+#include "lattice/detail/rig_input.h"
+
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace sinew::lattice::detail {
+namespace {
+
+void check_joints(const JointTree& joints) {
+  const int n = static_cast<int>(joints.parents.size());
+  if (n == 0) throw std::invalid_argument("lattice: there is no joint");
+  if (joints.positions.rows() != n || static_cast<int>(joints.names.size()) != n) {
+    throw std::invalid_argument(fmt::format("lattice: {} joint positions and {} names for {} joints",
+                                            joints.positions.rows(), joints.names.size(), n));
+  }
+  for (int j = 0; j < n; ++j) {
+    if (!joints.positions.row(j).allFinite()) {
+      throw std::invalid_argument(
+          fmt::format("lattice: joint '{}' has a position that is not finite", joints.names[j]));
+    }
+    if (joints.parents[j] >= j || joints.parents[j] < -1) {
+      throw std::invalid_argument(
+          fmt::format("lattice: joint '{}' does not come after its parent", joints.names[j]));
+    }
+  }
+}
+
+void check_weights(const Surface& skin, int num_joints) {
+  double total = 0.0;
+  for (std::size_t v = 0; v < skin.weights.size(); ++v)
+    for (const Influence& influence : skin.weights[v]) {
+      if (influence.frame < 0 || influence.frame >= num_joints) {
+        throw std::invalid_argument(fmt::format(
+            "lattice: skin vertex {} hangs on joint {}, which does not exist", v, influence.frame));
+      }
+      total += influence.weight;
+    }
+  if (!(total > 0.0)) throw std::invalid_argument("lattice: no skin vertex has a weight");
+}
+
+}  // namespace
+
+RigInput make_rig_input(const Surface& skin, const JointTree& joints) {
+  check_joints(joints);
+  check_weights(skin, static_cast<int>(joints.parents.size()));
+  UnitSkin unit = make_unit_skin(skin);
+  JointTree unit_joints = joints;
+  for (Eigen::Index j = 0; j < joints.positions.rows(); ++j)
+    unit_joints.positions.row(j) = unit.to_unit(joints.positions.row(j).transpose()).transpose();
+  JointWeights weights = joint_weights(unit, joints);
+  return {skin, joints, std::move(unit), std::move(unit_joints), std::move(weights)};
+}
+
+}  // namespace sinew::lattice::detail
