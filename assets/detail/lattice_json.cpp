@@ -1,0 +1,148 @@
+#include "assets/detail/lattice_json.h"
+
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "assets/error.h"
+
+namespace sinew::assets::detail {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Eigen::Vector3d;
+
+constexpr int kVersion = 1;
+
+Json to_json(const Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
+
+Json to_json(const lattice::BoneAnchor& anchor, const std::vector<std::string>& names) {
+  return {{"joint_a", names[anchor.joint_a]},
+          {"joint_b", names[anchor.joint_b]},
+          {"x_a", to_json(anchor.x_a)},
+          {"x_b", to_json(anchor.x_b)}};
+}
+
+/// Reads keys and turns what is missing or of the wrong type into one line.
+class JsonReader {
+ public:
+  JsonReader(const std::string& where, const lattice::JointTree& joints) : where_(where) {
+    for (int j = 0; j < static_cast<int>(joints.names.size()); ++j) joint_of_.emplace(joints.names[j], j);
+  }
+
+  [[noreturn]] void fail(const std::string& what) const { throw InputError(where_, what); }
+
+  const Json& at(const Json& object, const char* key) const {
+    if (!object.is_object() || !object.contains(key)) fail(std::string("key '") + key + "' is missing");
+    return object[key];
+  }
+  template <class T>
+  T get(const Json& object, const char* key) const {
+    try {
+      return at(object, key).get<T>();
+    } catch (const nlohmann::json::exception&) {
+      fail(std::string("key '") + key + "' has the wrong type");
+    }
+  }
+  Vector3d point(const Json& object, const char* key) const {
+    const auto values = get<std::vector<double>>(object, key);
+    if (values.size() != 3)
+      fail(std::string("key '") + key + "': got " + std::to_string(values.size()) + " numbers, expected 3");
+    return {values[0], values[1], values[2]};
+  }
+  int joint(const std::string& name) const {
+    const auto found = joint_of_.find(name);
+    if (found == joint_of_.end())
+      fail("joint '" + name + "' is not in the rig; hint: take the rig that the lattice was built for");
+    return found->second;
+  }
+  int joint(const Json& object, const char* key) const { return joint(get<std::string>(object, key)); }
+  lattice::BoneAnchor anchor(const Json& object, const char* key) const {
+    const Json& a = at(object, key);
+    return {joint(a, "joint_a"), joint(a, "joint_b"), point(a, "x_a"), point(a, "x_b")};
+  }
+
+ private:
+  const std::string& where_;
+  std::map<std::string, int> joint_of_;
+};
+
+Json bone_to_json(const lattice::LatticeBone& bone, const std::vector<std::string>& names) {
+  return {{"name", bone.name},
+          {"frame", names[bone.frame]},
+          {"start", to_json(bone.start, names)},
+          {"end", to_json(bone.end, names)},
+          {"rest_start", to_json(bone.rest_start)},
+          {"rest_end", to_json(bone.rest_end)},
+          {"chain", bone.chain},
+          {"soft", bone.soft},
+          {"tip", bone.tip}};
+}
+
+lattice::LatticeBone bone_from_json(const Json& json, const JsonReader& reader) {
+  lattice::LatticeBone bone;
+  bone.name = reader.get<std::string>(json, "name");
+  bone.frame = reader.joint(json, "frame");
+  bone.start = reader.anchor(json, "start");
+  bone.end = reader.anchor(json, "end");
+  bone.rest_start = reader.point(json, "rest_start");
+  bone.rest_end = reader.point(json, "rest_end");
+  bone.chain = reader.get<std::vector<int>>(json, "chain");
+  bone.soft = reader.get<bool>(json, "soft");
+  bone.tip = reader.get<bool>(json, "tip");
+  return bone;
+}
+
+}  // namespace
+
+std::string lattice_to_json(const lattice::ControlLattice& lattice, const lattice::JointTree& joints) {
+  Json json;
+  json["version"] = kVersion;
+  json["edge_length"] = lattice.edge_length;
+  json["retries"] = lattice.retries;
+  json["bones"] = Json::array();
+  for (const lattice::LatticeBone& bone : lattice.bones)
+    json["bones"].push_back(bone_to_json(bone, joints.names));
+  json["soft_frames"] = Json::array();
+  for (const lattice::SoftFrame& frame : lattice.soft_frames)
+    json["soft_frames"].push_back(
+        {{"frame", joints.names[frame.frame]}, {"position", to_json(frame.position)}});
+  json["changes"] = Json::array();
+  for (const lattice::SkeletonChange& change : lattice.changes)
+    json["changes"].push_back({{"joint", change.joint}, {"what", change.what}, {"reason", change.reason}});
+  json["frame_of_joint"] = Json::array();
+  for (std::size_t j = 0; j < lattice.frame_of_joint.size(); ++j) {
+    const int frame = lattice.frame_of_joint[j];
+    json["frame_of_joint"].push_back({joints.names[j], frame < 0 ? "" : joints.names[frame]});
+  }
+  return json.dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+void lattice_from_json(const std::string& where, const std::string& text, const lattice::JointTree& joints,
+                       lattice::ControlLattice& lattice) {
+  const JsonReader reader(where, joints);
+  const Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded()) reader.fail("is not JSON");
+  const int version = reader.get<int>(json, "version");
+  if (version != kVersion)
+    reader.fail("version, got " + std::to_string(version) + ", expected " + std::to_string(kVersion));
+  lattice.edge_length = reader.get<double>(json, "edge_length");
+  lattice.retries = reader.get<int>(json, "retries");
+  for (const Json& bone : reader.at(json, "bones")) lattice.bones.push_back(bone_from_json(bone, reader));
+  for (const Json& frame : reader.at(json, "soft_frames"))
+    lattice.soft_frames.push_back({reader.joint(frame, "frame"), reader.point(frame, "position")});
+  for (const Json& change : reader.at(json, "changes"))
+    lattice.changes.push_back({reader.get<std::string>(change, "joint"),
+                               reader.get<std::string>(change, "what"),
+                               reader.get<std::string>(change, "reason")});
+  lattice.frame_of_joint.assign(joints.names.size(), -1);
+  for (const Json& pair : reader.at(json, "frame_of_joint")) {
+    if (!pair.is_array() || pair.size() != 2 || !pair[0].is_string() || !pair[1].is_string())
+      reader.fail("key 'frame_of_joint': expected pairs of names");
+    const std::string frame = pair[1].get<std::string>();
+    lattice.frame_of_joint[reader.joint(pair[0].get<std::string>())] =
+        frame.empty() ? -1 : reader.joint(frame);
+  }
+}
+
+}  // namespace sinew::assets::detail
