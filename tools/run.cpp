@@ -21,6 +21,7 @@ namespace {
 /// One line per subcommand of tools/command.h that exists.
 void add_commands(CLI::App& app, CommandContext& context) {
   add_inspect_command(app, context);
+  add_lattice_command(app, context);
 }
 
 const CLI::App& deepest_parsed(const CLI::App& app) {

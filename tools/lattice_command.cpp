@@ -1,0 +1,172 @@
+#include "tools/lattice_command.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "assets/error.h"
+#include "assets/lattice_files.h"
+#include "assets/lattice_input.h"
+#include "assets/rig.h"
+#include "tools/command.h"
+#include "tools/failure.h"
+#include "tools/interrupt.h"
+
+namespace sinew::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kMinCells = 20, kMaxCells = 1'000'000;
+constexpr double kMinHeight = 1e-3, kMaxHeight = 1e4;  ///< [m], as the scene's.
+
+Json to_json(const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
+
+void check_request(const LatticeRequest& request) {
+  if (request.cells < kMinCells)
+    throw assets::ConfigError(
+        fmt::format("--cells: got {}, expected {} ... {}; hint: 1000 cells suffice for most "
+                    "characters",
+                    request.cells, kMinCells, kMaxCells));
+  if (request.cells > kMaxCells)
+    throw assets::LimitError(
+        fmt::format("--cells: got {}, the limit is {} cells; hint: 1000 cells suffice for most "
+                    "characters",
+                    request.cells, kMaxCells));
+  if (request.height && !(*request.height >= kMinHeight && *request.height <= kMaxHeight))
+    throw assets::ConfigError(
+        fmt::format("--height: got {}, expected {} ... {} [m]", *request.height, kMinHeight, kMaxHeight));
+  assets::lattice_format(request.output);
+  std::error_code ignored;
+  if (!request.overwrite && std::filesystem::exists(std::filesystem::symlink_status(request.output, ignored)))
+    throw assets::BusyError(request.output + ": is there already; hint: give --overwrite or another name");
+}
+
+/// One line for the failures of the gate, the worst first.
+std::string gate_message(const std::string& rig, const lattice::BuildResult& result) {
+  const auto& failures = result.failures;
+  const auto worst =
+      std::find_if(failures.begin(), failures.end(), [](const auto& f) { return !f.tolerable; });
+  const lattice::GateFailure& shown = worst == failures.end() ? failures.front() : *worst;
+  const std::string more = failures.size() > 1 ? fmt::format(" (and {} more)", failures.size() - 1) : "";
+  return fmt::format(
+      "{}: lattice: {}{}, after {} retries; hint: try another number of cells, for example --cells {}", rig,
+      shown.what, more, result.lattice.retries, 2 * result.lattice.complex.cells.size());
+}
+
+void print_summary(const LatticeRequest& request, const lattice::ControlLattice& lattice, double seconds) {
+  const lattice::LatticeQuality& q = lattice.quality;
+  int hard = 0, tips = 0, soft = 0;
+  for (const lattice::LatticeBone& bone : lattice.bones) {
+    ++(bone.soft ? soft : hard);
+    tips += bone.tip;
+  }
+  fmt::print(stderr, "{}: {} cells, {} vertices, edges of about {:.3g} m, in {:.2f} s\n", request.output,
+             lattice.complex.cells.size(), lattice.complex.points.rows(), lattice.edge_length, seconds);
+  fmt::print(stderr, "  bones: {} on edges ({} of them tip bones), {} soft, {} soft frames\n", hard, tips,
+             soft, lattice.soft_frames.size());
+  fmt::print(
+      stderr,
+      "  quality: smallest dihedral angle {:.1f} degrees, smallest scaled Jacobian {:.3f}, volume {:.2f} of "
+      "the skin's, {} component{}, {} retries\n",
+      q.min_dihedral_degrees, q.min_scaled_jacobian, q.volume_ratio, q.components,
+      q.components == 1 ? "" : "s", lattice.retries);
+  for (const lattice::SkeletonChange& change : lattice.changes)
+    fmt::print(stderr, "  {}: {}: {}\n", single_line(change.joint), change.what, single_line(change.reason));
+}
+
+}  // namespace
+
+std::string lattice_report(const lattice::ControlLattice& lattice, const lattice::JointTree& joints) {
+  Json json;
+  json["vertices"] = Json::array();
+  for (Eigen::Index v = 0; v < lattice.complex.points.rows(); ++v)
+    json["vertices"].push_back(to_json(lattice.complex.points.row(v).transpose()));
+  json["cells"] = Json::array();
+  for (const lattice::Cell& cell : lattice.complex.cells)
+    json["cells"].push_back(
+        std::vector<int>(cell.vertices.begin(), cell.vertices.begin() + num_corners(cell.type)));
+  json["edge_length"] = lattice.edge_length;
+  json["bones"] = Json::array();
+  json["tip_bones"] = Json::array();
+  json["soft_bones"] = Json::array();
+  for (const lattice::LatticeBone& bone : lattice.bones) {
+    json["bones"].push_back({{"name", bone.name},
+                             {"frame", joints.names[bone.frame]},
+                             {"chain", bone.chain},
+                             {"soft", bone.soft},
+                             {"tip", bone.tip},
+                             {"start", to_json(bone.rest_start)},
+                             {"end", to_json(bone.rest_end)}});
+    if (bone.tip) json["tip_bones"].push_back(bone.name);
+    if (bone.soft) json["soft_bones"].push_back(bone.name);
+  }
+  json["soft_frames"] = Json::array();
+  for (const lattice::SoftFrame& frame : lattice.soft_frames)
+    json["soft_frames"].push_back(
+        {{"frame", joints.names[frame.frame]}, {"position", to_json(frame.position)}});
+  json["changes"] = Json::array();
+  for (const lattice::SkeletonChange& change : lattice.changes)
+    json["changes"].push_back({{"joint", change.joint}, {"what", change.what}, {"reason", change.reason}});
+  const lattice::LatticeQuality& q = lattice.quality;
+  json["quality"] = {{"min_dihedral_degrees", q.min_dihedral_degrees},
+                     {"min_scaled_jacobian", q.min_scaled_jacobian},
+                     {"min_volume", q.min_volume},
+                     {"volume_ratio", q.volume_ratio},
+                     {"skin_vertices_outside", q.skin_vertices_outside},
+                     {"skin_triangles_outside", q.skin_triangles_outside},
+                     {"exact_chains", q.exact_chains},
+                     {"components", q.components},
+                     {"components_without_bone", q.components_without_bone},
+                     {"retries", lattice.retries}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void run_lattice(const LatticeRequest& request) {
+  check_request(request);
+  const auto start = std::chrono::steady_clock::now();
+  assets::LoadOptions load;
+  load.height = request.height.value_or(0.0);
+  const assets::Rig rig = assets::load_rig(request.rig, load);
+  const assets::LatticeInput input = assets::lattice_input(rig);
+  stop_if_interrupted("before building the lattice");
+  lattice::BuildOptions options;
+  options.cells = request.cells;
+  lattice::BuildResult result;
+  try {
+    result = lattice::build(input.skin.surface, input.joints, options);
+  } catch (const std::invalid_argument& error) {
+    throw assets::InputError(request.rig, error.what());
+  }
+  stop_if_interrupted("before writing the lattice");
+  if (!result.failures.empty()) throw NumericalError(gate_message(request.rig, result));
+  assets::write_lattice(request.output, result.lattice, input.joints,
+                        request.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse);
+  if (request.json) std::cout << lattice_report(result.lattice, input.joints);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  print_summary(request, result.lattice, elapsed.count());
+}
+
+void add_lattice_command(CLI::App& app, CommandContext&) {
+  auto request = std::make_shared<LatticeRequest>();
+  CLI::App* command =
+      app.add_subcommand("lattice", "Build the control lattice of a rig and write it to a file.");
+  command->add_option("RIG", request->rig, "the character: glTF, FBX, Collada, ...")->required();
+  command->add_option("-o,--output", request->output, "file to write: .vtu (ParaView) or .mesh (Medit)")
+      ->required();
+  command->add_option("--cells", request->cells, "wanted number of cells, 20 ... 1000000")
+      ->capture_default_str();
+  command->add_option("--height", request->height,
+                      "height of the character [m]; guessed where it is not given");
+  command->add_flag("--overwrite", request->overwrite, "replace the file if it is there");
+  command->add_flag("--json", request->json, "print the lattice as JSON on stdout");
+  command->callback([request] { run_lattice(*request); });
+}
+
+}  // namespace sinew::tools
