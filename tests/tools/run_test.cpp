@@ -151,6 +151,19 @@ TEST(Command, SuggestsTheNearestOption) {
   EXPECT_EQ(outcome.text, "sinew: --verzion: unknown option; hint: did you mean --version?\n");
 }
 
+TEST(Command, SuggestsTheNearestOptionOfTheSubcommandAndTheNearestSubcommand) {
+  const Outcome option = run_sinew("inspect --jsno x 2>&1 >/dev/null");
+  EXPECT_EQ(option.exit_code, 2);
+  EXPECT_EQ(option.text, "sinew: --jsno: unknown option; hint: did you mean --json?\n");
+  const Outcome far_off = run_sinew("inspect --temperature=3 x 2>&1 >/dev/null");
+  EXPECT_EQ(far_off.exit_code, 2);
+  EXPECT_EQ(far_off.text, "sinew: --temperature: unknown option; hint: see sinew inspect --help\n");
+  const Outcome command = run_sinew("insect x 2>&1 >/dev/null");
+  EXPECT_EQ(command.exit_code, 2);
+  EXPECT_NE(command.text.find("sinew: insect: unknown command, expected one of inspect,"), std::string::npos);
+  EXPECT_NE(command.text.find("hint: did you mean inspect?\n"), std::string::npos) << command.text;
+}
+
 TEST(Command, SaysWhenACommandIsMissing) {
   const Outcome outcome = run_sinew("2>&1 >/dev/null");
   EXPECT_EQ(outcome.exit_code, 2);
