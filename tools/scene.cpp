@@ -60,7 +60,7 @@ std::string print_material(const BoneMaterial& material) {
   return text;
 }
 
-/// "0.45" for a number: what --help and the comment of a printed scene say about it.
+/// What a printed scene says about the key.
 std::string comment(const SceneField& field) {
   return field.symbol.empty() ? std::string(field.help)
                               : fmt::format("{}; {}", field.help, range_text(field));

@@ -163,6 +163,19 @@ Eigen::Vector3d parse_vector(const SceneField& field, std::string_view text, con
   return vector;
 }
 
+/// The shortest text that reads back as the same double: a fraction 1/n where that is exact and shorter.
+std::string number_text(double value) {
+  std::string text = fmt::format("{}", value);
+  const double n = std::round(1.0 / value);
+  const std::string fraction = fmt::format("1/{:.0f}", n);
+  return n > 1.0 && 1.0 / n == value && fraction.size() < text.size() ? fraction : text;
+}
+
+/// TOML knows no fractions; as strings they are read again.
+std::string toml_number(const std::string& text) {
+  return text.find('/') == std::string::npos ? text : '"' + text + '"';
+}
+
 std::string toml_string(const SceneField& field, const std::string& text) {
   if (!is_utf8(text)) {
     throw ConfigError(
@@ -279,29 +292,42 @@ void set_from_text(Scene& scene, const SceneField& field, std::string_view text,
   check_field(scene, field, where);
 }
 
-std::string toml_value(const Scene& scene, const SceneField& field) {
-  const auto text = [&](const std::string& value) { return value.empty() ? "" : toml_string(field, value); };
+std::string flag_text(const Scene& scene, const SceneField& field) {
   const auto choice = [](const std::vector<std::string>& names, auto value) {
-    return fmt::format("\"{}\"", names[static_cast<std::size_t>(value)]);
+    return names[static_cast<std::size_t>(value)];
   };
-  // fmt's {} writes the shortest text that reads back as the same double.
   return std::visit(
       Overloaded{
           [&](bool Scene::*member) { return std::string(scene.*member ? "true" : "false"); },
-          [&](std::string Scene::*member) { return text(scene.*member); },
-          [&](PathMember member) { return text(scene.*(member.path)); },
+          [&](std::string Scene::*member) { return scene.*member; },
+          [&](PathMember member) { return scene.*(member.path); },
           [&](int Scene::*member) { return fmt::format("{}", scene.*member); },
-          [&](double Scene::*member) { return fmt::format("{}", scene.*member); },
+          [&](double Scene::*member) { return number_text(scene.*member); },
           [&](std::optional<double> Scene::*member) {
-            return scene.*member ? fmt::format("{}", *(scene.*member)) : std::string();
+            return scene.*member ? number_text(*(scene.*member)) : std::string();
           },
-          [&](Eigen::Vector3d Scene::*member) { return fmt::format("[{}]", fmt::join(scene.*member, ", ")); },
+          [&](Eigen::Vector3d Scene::*member) { return fmt::format("{}", fmt::join(scene.*member, ",")); },
           [&](std::optional<FrameRange> Scene::*member) {
-            return scene.*member ? fmt::format("\"{}-{}\"", (scene.*member)->first, (scene.*member)->last)
+            return scene.*member ? fmt::format("{}-{}", (scene.*member)->first, (scene.*member)->last)
                                  : std::string();
           },
           [&](Integrator Scene::*member) { return choice(kIntegratorNames, scene.*member); },
           [&](OutputSpace Scene::*member) { return choice(kOutputSpaceNames, scene.*member); },
+      },
+      field.member);
+}
+
+std::string toml_value(const Scene& scene, const SceneField& field) {
+  const std::string text = flag_text(scene, field);
+  if (text.empty()) return text;
+  return std::visit(
+      Overloaded{
+          [&](bool Scene::*) { return text; },
+          [&](int Scene::*) { return text; },
+          [&](double Scene::*) { return toml_number(text); },
+          [&](std::optional<double> Scene::*) { return toml_number(text); },
+          [&](Eigen::Vector3d Scene::*member) { return fmt::format("[{}]", fmt::join(scene.*member, ", ")); },
+          [&](auto) { return toml_string(field, text); },
       },
       field.member);
 }

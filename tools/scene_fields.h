@@ -71,6 +71,9 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
 /// checks it. Throws as check_number.
 void set_from_text(Scene& scene, const SceneField& field, std::string_view text, const std::string& where);
 
+/// The value as a flag takes it; empty where it is unset.
+std::string flag_text(const Scene& scene, const SceneField& field);
+
 /// The value as TOML; empty where it is unset.
 std::string toml_value(const Scene& scene, const SceneField& field);
 

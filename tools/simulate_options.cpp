@@ -25,8 +25,19 @@ bool is_scene_file(const std::string& file) {
 
 std::string help_text(const SceneField& field) {
   const std::string range = field.symbol.empty() ? "" : fmt::format("; {}", range_text(field));
-  const std::string value = toml_value(Scene{}, field);
+  const std::string value = flag_text(Scene{}, field);
   return fmt::format("{}{}{}", field.help, range, value.empty() ? "" : fmt::format(" [{}]", value));
+}
+
+/// What stands for the value in --help.
+std::string placeholder(const SceneField& field) {
+  if (field.key == "output") return "DIR";
+  if (!field.unit.empty()) return std::string(field.unit);
+  if (std::holds_alternative<PathMember>(field.member)) return "FILE";
+  if (std::holds_alternative<int Scene::*>(field.member)) return "N";
+  if (std::holds_alternative<double Scene::*>(field.member)) return "X";
+  if (std::holds_alternative<std::optional<FrameRange> Scene::*>(field.member)) return "A-B";
+  return "NAME";
 }
 
 }  // namespace
@@ -41,8 +52,7 @@ void SimulateOptions::add_to(CLI::App& command) {
     if (std::holds_alternative<bool Scene::*>(field.member)) {
       command.add_flag(name, switches_[key], std::string(field.help));
     } else {
-      command.add_option(name, flags_[key], help_text(field))
-          ->type_name(field.unit.empty() ? "" : std::string(field.unit));
+      command.add_option(name, flags_[key], help_text(field))->type_name(placeholder(field));
     }
   }
   command.add_flag("--print-scene", print_scene_only_, "print the whole scene in force as TOML and stop");

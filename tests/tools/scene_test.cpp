@@ -299,6 +299,7 @@ TEST_F(SceneFile, PrintsEveryKey) {
     EXPECT_NE(text.find(std::string(field.key) + " ="), std::string::npos) << field.key;
   }
   EXPECT_NE(text.find("# Poisson's ratio; -1 < nu < 0.5\npoisson = 0.45\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\nstep = \"1/120\"\n"), std::string::npos) << text;
   EXPECT_NE(text.find("integrator = \"bdf2\"\n"), std::string::npos) << text;
 }
 
