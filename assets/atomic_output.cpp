@@ -64,9 +64,13 @@ std::string partial_prefix(const fs::path& target) {
   return fmt::format(".{}.partial-", target.filename().string());
 }
 
-/// Opens `path` and takes its lock without waiting; -1 where another process has it or it is gone.
-int open_locked(const fs::path& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+/// Locked by the process that fills a folder, for as long as it does. Not the folder itself: writing a file
+/// in it locks that for a moment.
+constexpr const char* kLockName = ".writing";
+
+/// Opens a file and takes its lock without waiting; -1 where another process has it or it is gone.
+int open_locked(const fs::path& path, int flags = O_RDONLY) {
+  const int fd = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
   if (fd < 0) return -1;
   if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
   ::close(fd);
@@ -83,10 +87,16 @@ void clear_partials(const fs::path& target, const std::string& shown) {
     if (it->path().filename().string().rfind(prefix, 0) == 0) found.push_back(it->path());
   if (error) fail(shown, "cannot read folder '" + target.parent_path().string() + "'", error.value());
   for (const fs::path& partial : found) {
-    const Descriptor lock(open_locked(partial));
-    if (lock.get() < 0 && fs::exists(partial, error))
+    const fs::path lock_file = fs::is_directory(partial, error) ? partial / kLockName : partial;
+    const Descriptor lock(open_locked(lock_file));
+    if (lock.get() < 0 && fs::exists(lock_file, error))
       throw BusyError(shown + ": process " + partial.filename().string().substr(prefix.size()) +
                       " is writing it; hint: wait for it or choose another output");
+    // Killed after it moved the earlier run aside and before it put the new one in place: the earlier comes
+    // back.
+    if (partial.string().ends_with(kAside) && !fs::exists(fs::symlink_status(target, error)) &&
+        ::rename(partial.c_str(), target.c_str()) == 0)
+      continue;
     fs::remove_all(partial, error);
     if (error)
       fail(shown, "cannot remove '" + partial.string() + "', which a stopped run left", error.value());
@@ -174,11 +184,11 @@ void write_file(const std::string& path, std::string_view bytes, Overwrite overw
   const fs::path target = absolute_target(path);
   const fs::path partial = target.parent_path() / (partial_prefix(target) + std::to_string(::getpid()));
   const Descriptor parent = lock_parent(target, path);
+  clear_partials(target, path);
   std::error_code error;
   if (fs::is_directory(target, error)) throw IoError(path + ": is a folder, expected a file or a new name");
   if (overwrite == Overwrite::Refuse && fs::exists(target, error))
     throw BusyError(path + ": exists already; hint: --overwrite replaces it");
-  clear_partials(target, path);
   const Descriptor file(::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (file.get() < 0) fail(path, "cannot be created", errno);
   try {
@@ -198,16 +208,17 @@ OutputDirectory::OutputDirectory(const std::string& path, Overwrite overwrite,
     : shown_(path), overwrite_(overwrite), own_names_(own_names) {
   const fs::path target = absolute_target(path);
   const Descriptor parent = lock_parent(target, path);
-  check_replaceable(target, path, overwrite, own_names);
   clear_partials(target, path);
+  check_replaceable(target, path, overwrite, own_names);
   const fs::path partial = target.parent_path() / (partial_prefix(target) + std::to_string(::getpid()));
   if (::mkdir(partial.c_str(), 0777) != 0) fail(path, "cannot be created", errno);
   target_ = target.string();
   partial_ = partial.string();
-  lock_ = open_locked(partial);
+  lock_ = open_locked(partial / kLockName, O_WRONLY | O_CREAT | O_EXCL);
   if (lock_ < 0) {
-    ::rmdir(partial.c_str());
-    throw IoError(path + ": cannot lock '" + partial_ + "'");
+    const int reason = errno;
+    fs::remove_all(partial);
+    fail(path, "cannot be created", reason);
   }
 }
 
@@ -227,6 +238,7 @@ void OutputDirectory::commit() {
   sync_path(partial, shown_);
   const Descriptor parent = lock_parent(target, shown_);
   check_replaceable(target, shown_, overwrite_, own_names_);  // it may have been filled since we started
+  if (::unlink((partial / kLockName).c_str()) != 0) fail(shown_, "cannot be finished", errno);
   put_in_place(partial, target, shown_);
   sync_path(target.parent_path(), shown_);
   // Now the sibling is the earlier run, if there was one.

@@ -302,7 +302,7 @@ std::string obj_text(const std::vector<NamedMesh>& parts, const std::string& com
     std::string name = part.name.empty() ? "part" : part.name;
     for (char& c : name)
       if (static_cast<unsigned char>(c) <= ' ') c = '_';
-    fmt::format_to(out, "o {}\n", name);
+    fmt::format_to(out, "g {}\n", name);
     const FloatPoints points = to_float(part.points);
     for (Eigen::Index v = 0; v < points.rows(); ++v)
       fmt::format_to(out, "v {} {} {}\n", points(v, 0), points(v, 1), points(v, 2));

@@ -15,7 +15,8 @@ struct NamedMesh {
   lattice::Triangles triangles;  ///< indices into points.
 };
 
-/// The text of a Wavefront OBJ file: one object per part, vertices in the given order over all parts.
+/// The text of a Wavefront OBJ file: one group (`g`) per part, vertices in the given order over all parts.
+/// Not one object (`o`) per part: importers make a mesh of each, and a point cache fits only the whole.
 /// Coordinates are rounded to float and printed with as many digits as bring the same float back. Throws
 /// std::domain_error as to_float, std::invalid_argument for an index out of range.
 std::string obj_text(const std::vector<NamedMesh>& parts, const std::string& comment = {});

@@ -57,7 +57,7 @@ class AtomicOutput : public testing::Test {
 TEST_F(AtomicOutput, FilesAppearUnderTheirNameOnlyWithCommit) {
   OutputDirectory out(at("run"), Overwrite::Refuse, own_);
   put(out.file("skin.pc2"), "points");
-  put(out.file("skin.json"), "words");
+  write_file(out.file("skin.json"), "words", Overwrite::Refuse);  // must not wait for the folder's own lock
   EXPECT_FALSE(fs::exists(at("run")));
   out.commit();
   EXPECT_THAT(entries(), ElementsAre("run", "run/skin.json", "run/skin.pc2"));
@@ -171,12 +171,25 @@ TEST_F(AtomicOutput, WhatAKilledProcessLeftIsRemovedByTheNext) {
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFSIGNALED(status));
   const std::string left = ".run.partial-" + std::to_string(child);
-  ASSERT_THAT(entries(), ElementsAre(left, left + "/skin.pc2"));
+  ASSERT_THAT(entries(), ElementsAre(left, left + "/.writing", left + "/skin.pc2"));
   {
     const OutputDirectory out(at("run"), Overwrite::Refuse, own_);
-    EXPECT_THAT(entries(), ElementsAre(".run.partial-" + std::to_string(::getpid())));
+    const std::string own = ".run.partial-" + std::to_string(::getpid());
+    EXPECT_THAT(entries(), ElementsAre(own, own + "/.writing"));
   }
   EXPECT_THAT(entries(), IsEmpty());
+}
+
+TEST_F(AtomicOutput, AnEarlierRunThatWasMovedAsideComesBack) {
+  // What a process leaves that is killed between the two renames of a file system that cannot swap.
+  const std::string partial = ".run.partial-1";
+  fs::create_directory(at(partial));
+  fs::create_directory(at(partial + "-replaced"));
+  put(at(partial + "-replaced/skin.pc2"), "old");
+  { OutputDirectory(at("other"), Overwrite::Refuse, own_); }  // not its business
+  EXPECT_TRUE(fs::exists(at(partial)));
+  { OutputDirectory(at("run"), Overwrite::Replace, own_); }
+  EXPECT_THAT(entries(), ElementsAre("run", "run/skin.pc2"));
 }
 
 TEST_F(AtomicOutput, TwoProcessesCannotWriteTheSameOutput) {
@@ -199,7 +212,7 @@ TEST_F(AtomicOutput, TwoProcessesCannotWriteTheSameOutput) {
   int status = 0;
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   EXPECT_EQ(WEXITSTATUS(status), 42);
-  EXPECT_THAT(entries(), ElementsAre(".run.partial-" + std::to_string(::getpid())));
+  EXPECT_TRUE(fs::exists(at(".run.partial-" + std::to_string(::getpid()))));
 }
 
 TEST_F(AtomicOutput, AFullDiskNamesTheFileAndLeavesTheEarlierOne) {

@@ -41,11 +41,11 @@ NamedMesh triangle(const std::string& name) {
   return mesh;
 }
 
-TEST(ObjText, HasOneObjectPerPartAndCountsVerticesOverAll) {
+TEST(ObjText, HasOneGroupPerPartAndCountsVerticesOverAll) {
   EXPECT_EQ(obj_text({triangle("body"), triangle("left eye")}, "rest mesh"),
             "# rest mesh\n"
-            "o body\nv 0 0 0\nv 1 0 0\nv 0 0.1 0\nf 1 2 3\n"
-            "o left_eye\nv 0 0 0\nv 1 0 0\nv 0 0.1 0\nf 4 5 6\n");
+            "g body\nv 0 0 0\nv 1 0 0\nv 0 0.1 0\nf 1 2 3\n"
+            "g left_eye\nv 0 0 0\nv 1 0 0\nv 0 0.1 0\nf 4 5 6\n");
 }
 
 TEST(ObjText, BringsEveryFloatBack) {
