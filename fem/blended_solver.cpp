@@ -363,7 +363,6 @@ struct BlendedSolver::Impl::StepData {
   StagePoses poses;
   Stage stage;
   double h, alpha, beta;
-  double elapsed;  ///< from the begin of the step to the stage [s].
   Eigen::Vector3d gravity;
   bool use_past;
   Points x_h, v_h, x_known, v_known, x_now, x_past;  ///< coefficients.
@@ -386,7 +385,13 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
   const Eigen::Matrix3d now_local = now.rotation.transpose(), past_local = past.rotation.transpose();
   const double th = step.stage.theta * step.h;
   const double b = step.beta / (step.stage.kappa * step.h);
-  const Eigen::Affine3d carried = end.from_rest * now.from_rest.inverse();
+  // From now, and from one step earlier, to the end of the stage with the region.
+  const Eigen::Affine3d from_now = end.from_rest * now.from_rest.inverse();
+  const Eigen::Affine3d from_past = end.from_rest * past.from_rest.inverse();
+  const auto carry = [](const Eigen::Affine3d& map, const Eigen::Vector3d& x,
+                        double is_value) -> Eigen::Vector3d {
+    return map.linear() * x + is_value * map.translation();
+  };
 
   for (std::size_t k = 0; k < s.functions.size(); ++k) {
     const int f = s.functions[k];
@@ -401,13 +406,17 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
     const Eigen::Vector3d p = to_local * (x_stage - is_value * end.origin);
     const Eigen::Vector3d u_end = p - rest;
     Eigen::Vector3d u_past = now_local * (x_now - is_value * now.origin) - rest;
+    Eigen::Vector3d carried = carry(from_now, x_now, is_value);
     if (step.use_past) {
-      const Eigen::Vector3d u_before =
-          past_local * (step.x_past.row(f).transpose() - is_value * past.origin) - rest;
+      const Eigen::Vector3d x_past = step.x_past.row(f).transpose();
+      const Eigen::Vector3d u_before = past_local * (x_past - is_value * past.origin) - rest;
       u_past = (4.0 * u_past - u_before) / 3.0;
+      carried = (4.0 * carried - carry(from_past, x_past, is_value)) / 3.0;
     }
-    const Eigen::Vector3d moved = carried.linear() * x_now + is_value * carried.translation();
-    const Eigen::Vector3d v_frame = (moved - x_now) / step.elapsed;
+    // v+ - v_frame is the integrator's own difference of the flesh's place in the region: as exact as its
+    // step.
+    const Eigen::Vector3d x_h = step.x_h.row(f).transpose();
+    const Eigen::Vector3d v_frame = (carried - x_h) / (step.stage.kappa * step.h);
     Eigen::Vector3d inertia = step.v_h.row(f).transpose() + (th * step.alpha) * v_frame;
     if (known) inertia -= (1.0 + th * step.alpha) * step.v_known.row(f).transpose();
     s.coefficients[k] = {lanes(to_local * inertia), lanes(-th * ((1.0 + b) * u_end - b * u_past)),
@@ -541,9 +550,8 @@ lattice::Points BlendedSolver::stage_velocity(const State& state, const Points& 
   step.use_past = use_past;
   const double eta_h = step.stage.eta * h;
   // A start's stage lies at t + eta h, a regular one at t + h.
-  step.elapsed = use_past ? h : eta_h;
-  const Points v_known =
-      known_velocity(body, state, x_h, poses, step.elapsed, eta_h, impl_->systems.size() > 1);
+  const double elapsed = use_past ? h : eta_h;
+  const Points v_known = known_velocity(body, state, x_h, poses, elapsed, eta_h, impl_->systems.size() > 1);
   const Points x_known = x_h + eta_h * v_known;
   const Coordinates& coordinates = impl_->coordinates;
   coordinates.analyse(x_h, step.x_h);
