@@ -280,6 +280,42 @@ TEST_F(SceneFile, ReadsBackExactlyWhatIsPrinted) {
   EXPECT_EQ(read(print_scene(Scene{})), Scene{});
 }
 
+TEST_F(SceneFile, GivesAValidSceneOrANamedErrorHoweverTheTextIsDamaged) {
+  std::mt19937_64 rng(20023);
+  const auto index = [&](std::size_t n) { return static_cast<std::size_t>(rng() % n); };
+  const std::vector<std::string> tokens{"\"",    "'''",  "[",   "]]",       "{",    "=", "\n",
+                                        "1e999", "-0x1", "nan", "material", "\xFF", ","};
+  int num_read = 0, num_refused = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::string text = print_scene(random_scene(rng));
+    for (std::size_t edits = 1 + index(3); edits > 0; --edits) {
+      const std::size_t at = index(text.size());
+      switch (index(4)) {
+        case 0:
+          text[at] = static_cast<char>(rng() & 0xFF);
+          break;
+        case 1:
+          text.erase(at, index(20));
+          break;
+        case 2:
+          text.insert(at, text.substr(index(text.size()), 20));
+          break;
+        default:
+          text.insert(at, tokens[index(tokens.size())]);
+      }
+    }
+    try {
+      read(text).validate();
+      ++num_read;
+    } catch (const assets::ConfigError& e) {
+      EXPECT_EQ(std::string(e.what()).rfind("scene.toml:", 0), 0u) << e.what();
+      ++num_refused;
+    }  // anything else fails the test
+  }
+  EXPECT_GT(num_read, 100);  // damage to a comment or a name leaves a scene
+  EXPECT_GT(num_refused, 100);
+}
+
 TEST_F(SceneFile, IsReadAndPrintedTheSameWhereTheLocaleWritesCommas) {
   std::mt19937_64 rng(20022);
   const Scene scene = random_scene(rng);
