@@ -229,6 +229,12 @@ OutputDirectory::~OutputDirectory() {
   if (lock_ >= 0) ::close(lock_);
 }
 
+void OutputDirectory::write(const std::string& name, std::string_view bytes) const {
+  const Descriptor out(::open(file(name).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  if (out.get() < 0) fail(shown_ + "/" + name, "cannot be created", errno);
+  write_all(out.get(), bytes, shown_ + "/" + name);  // commit() brings it to the disk
+}
+
 void OutputDirectory::commit() {
   const fs::path target(target_), partial(partial_);
   std::error_code error;

@@ -33,6 +33,9 @@ class OutputDirectory {
   /// Where to write the file of that name until commit().
   std::string file(const std::string& name) const { return partial_ + "/" + name; }
 
+  /// Writes a whole file into the folder. Throws IoError.
+  void write(const std::string& name, std::string_view bytes) const;
+
   /// Makes all files appear under `path`, in place of what was there. Throws IoError; then nothing changed.
   void commit();
 

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "assets/lattice_input.h"
+#include "assets/rig.h"
+#include "fem/simulation.h"
+#include "lattice/build.h"
+#include "tools/scene.h"
+
+/// From a scene to a body that can be simulated: rig, clip, lattice, flesh.
+namespace sinew::tools {
+
+/// Seconds spent in each phase, in order.
+using PhaseTimes = std::vector<std::pair<std::string, double>>;
+
+/// Everything a run needs, in the rig's space (SI, Y up).
+struct Character {
+  assets::Rig rig;
+  int clip = -1;                  ///< index into rig.clips.
+  assets::LatticeInput input;     ///< welded skin and joints.
+  lattice::BuildResult lattice;   ///< built, or read from the scene's lattice file.
+  fem::BodyOptions body_options;  ///< materials and damping in force.
+  double limb_thickness = 0.0;    ///< t of the default stiffness [m].
+  PhaseTimes times;
+
+  const skeleton::Clip& the_clip() const { return rig.clips[static_cast<std::size_t>(clip)]; }
+  /// pose_from_rest of every joint at a time [s].
+  std::vector<Eigen::Affine3d> pose(double time) const;
+};
+
+/// Called with one sentence for whatever the user should hear: warnings of the gate, what was chosen.
+using Talk = std::function<void(const std::string&)>;
+
+/// Loads the rig, chooses the clip, builds or reads the lattice and settles the materials. Throws the errors
+/// of assets/error.h, and NumericalError where the lattice has a failure that a simulation cannot bear.
+Character make_character(const Scene& scene, const Talk& talk);
+
+/// The flesh of the character. Throws assets::InputError naming the rig where the lattice cannot carry it.
+fem::Body make_body(const Character& character);
+
+/// fem's options for a scene.
+fem::SimulationOptions simulation_options(const Scene& scene);
+
+/// Clip times of the output frames: t0 + k / fps for the scene's frames, or for the whole clip.
+FrameRange frame_range(const Scene& scene, const skeleton::Clip& clip);
+
+}  // namespace sinew::tools

@@ -1,0 +1,120 @@
+#include "tools/run_report.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+
+namespace sinew::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json frame_json(const FrameReport& f, int active) {
+  const fem::Measures& m = f.measures;
+  return {{"frame", f.frame},
+          {"time_s", f.time},
+          {"steps", f.steps},
+          {"active_functions", active},
+          {"kinetic_J", m.kinetic},
+          {"elastic_J", m.elastic},
+          {"potential_J", m.potential},
+          {"largest_speed_m_per_s", m.largest_speed},
+          {"bone_residual_m", m.bone_residual},
+          {"largest_strain", m.largest_strain},
+          {"min_det_j", m.min_det},
+          {"inverted_cells", m.inverted_cells},
+          {"flipped_triangles", f.flipped_triangles}};
+}
+
+Json lattice_json(const lattice::ControlLattice& lattice) {
+  Json bones = Json::array();
+  for (const auto& bone : lattice.bones) {
+    bones.push_back({{"name", bone.name}, {"soft", bone.soft}, {"tip", bone.tip}, {"chain", bone.chain}});
+  }
+  Json changes = Json::array();
+  for (const auto& change : lattice.changes) {
+    changes.push_back({{"joint", change.joint}, {"what", change.what}, {"reason", change.reason}});
+  }
+  return {{"cells", lattice.complex.cells.size()},
+          {"vertices", lattice.complex.points.rows()},
+          {"edge_length_m", lattice.edge_length},
+          {"retries", lattice.retries},
+          {"bones", bones},
+          {"changes", changes}};
+}
+
+}  // namespace
+
+int count_flipped_triangles(const fem::Body& body, const lattice::Surface& surface,
+                            const lattice::Points& positions,
+                            const std::vector<Eigen::Affine3d>& pose_from_rest) {
+  const fem::PosedFrames posed = fem::pose_frames(body.tree, pose_from_rest, 0.0);
+  int flipped = 0;
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
+    const Eigen::RowVector3i v = surface.triangles.row(t);
+    const auto normal = [&](const lattice::Points& p) -> Eigen::Vector3d {
+      const Eigen::Vector3d a = p.row(v[0]).transpose(), b = p.row(v[1]).transpose(),
+                            c = p.row(v[2]).transpose();
+      return (b - a).cross(c - a);
+    };
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      for (const auto& influence : surface.weights[static_cast<std::size_t>(v[k])]) {
+        const int f = body.tree.frame_of_joint[static_cast<std::size_t>(influence.frame)];
+        if (f >= 0) rotation += influence.weight * posed.frames[static_cast<std::size_t>(f)].rotation;
+      }
+    }
+    if (normal(positions).dot(rotation * normal(surface.points)) < 0.0) ++flipped;
+  }
+  return flipped;
+}
+
+std::string report_json(const RunReport& report, const Character& character, const fem::Body& body) {
+  Json json;
+  json["sinew"] = report.version;
+  json["rig"] = character.rig.file;
+  json["clip"] = character.the_clip().name;
+  json["settings_toml"] = report.settings;
+  json["material"] = {{"young_Pa", character.body_options.material.young},
+                      {"poisson", character.body_options.material.poisson},
+                      {"density_kg_per_m3", character.body_options.material.density},
+                      {"limb_thickness_m", character.limb_thickness}};
+  json["height_m"] = character.rig.height;
+  json["metres_per_unit"] = character.rig.metres_per_unit;
+  json["lattice"] = lattice_json(character.lattice.lattice);
+  double largest_unknowns = 0.0;
+  for (int u : report.counts.unknowns) largest_unknowns = std::max(largest_unknowns, static_cast<double>(u));
+  json["solver"] = {{"regions", report.counts.regions},
+                    {"leaf_cells", body.mesh.cells.size()},
+                    {"active_functions", report.counts.functions},
+                    {"unknown_functions_per_region", report.counts.unknowns},
+                    {"factor_nonzeros", report.counts.factor_nonzeros},
+                    {"flesh_volume_m3", body.volume}};
+  Json times = Json::object();
+  for (const auto& [name, seconds] : report.times) times[name] = seconds;
+  json["seconds"] = times;
+  json["settle"] = {{"steps", report.settle_steps}, {"speed_left_m_per_s", report.settle_speed}};
+
+  double residual = 0.0, strain = 0.0, det = std::numeric_limits<double>::infinity();
+  int inverted = 0, flipped = 0;
+  Json frames = Json::array();
+  for (const FrameReport& f : report.frames) {
+    residual = std::max(residual, f.measures.bone_residual);
+    strain = std::max(strain, f.measures.largest_strain);
+    det = std::min(det, f.measures.min_det);
+    inverted = std::max(inverted, f.measures.inverted_cells);
+    flipped = std::max(flipped, f.flipped_triangles);
+    frames.push_back(frame_json(f, report.counts.functions));
+  }
+  json["worst"] = {{"bone_residual_m", residual},
+                   {"largest_strain", strain},
+                   {"min_det_j", det},
+                   {"inverted_cells", inverted},
+                   {"flipped_triangles", flipped}};
+  json["frames"] = frames;
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace sinew::tools

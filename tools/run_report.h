@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fem/measures.h"
+#include "fem/simulation.h"
+#include "tools/character.h"
+
+/// report.json: what a run did and what it found.
+namespace sinew::tools {
+
+/// One output frame.
+struct FrameReport {
+  int frame = 0;
+  double time = 0.0;  ///< of the clip [s].
+  int steps = 0;      ///< taken since the frame before.
+  fem::Measures measures;
+  int flipped_triangles = 0;  ///< skin triangles that face against their bones' rotation.
+};
+
+struct RunReport {
+  std::string version;
+  std::string settings;  ///< the scene in force, TOML.
+  PhaseTimes times;
+  int settle_steps = 0;
+  double settle_speed = 0.0;  ///< left when settling ended [m/s].
+  fem::SolverCounts counts;
+  std::vector<FrameReport> frames;
+};
+
+/// Triangles of the simulated surface whose posed normal points against their rest normal turned by the
+/// blended rotation of their vertices' frames. positions: of surface.points.
+int count_flipped_triangles(const fem::Body& body, const lattice::Surface& surface,
+                            const lattice::Points& positions,
+                            const std::vector<Eigen::Affine3d>& pose_from_rest);
+
+/// The report as JSON text, ending in a newline; numbers are locale-independent and round-trip.
+std::string report_json(const RunReport& report, const Character& character, const fem::Body& body);
+
+}  // namespace sinew::tools

@@ -1,0 +1,307 @@
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+
+#include "assets/atomic_output.h"
+#include "assets/error.h"
+#include "assets/lattice_files.h"
+#include "assets/obj.h"
+#include "assets/output_mesh.h"
+#include "assets/pc2.h"
+#include "assets/preview.h"
+#include "assets/sidecar.h"
+#include "tools/character.h"
+#include "tools/command.h"
+#include "tools/failure.h"
+#include "tools/interrupt.h"
+#include "tools/progress.h"
+#include "tools/run_report.h"
+#include "tools/simulate_options.h"
+
+namespace sinew::tools {
+namespace {
+
+using lattice::Points;
+
+/// Everything that a run may write into its folder.
+const std::vector<std::string> kOutputs{"skin.obj",    "skin.pc2",    "skin.json",
+                                        "lattice.vtu", "report.json", "preview.png"};
+
+void talk(const std::string& line) { std::cerr << line << '\n'; }
+
+/// Which vertices are written, in which order and space.
+struct OutputLayout {
+  Eigen::Affine3d from_rig = Eigen::Affine3d::Identity();  ///< rig space to the output's.
+  std::vector<int> rig_vertex;                             ///< rig vertex of every output vertex.
+  std::vector<assets::NamedMesh> parts;                    ///< rest, in the output's space.
+  assets::VertexOrder order = assets::VertexOrder::File;
+
+  Points apply(const Points& rig_points) const {
+    Points out(static_cast<Eigen::Index>(rig_vertex.size()), 3);
+    for (std::size_t i = 0; i < rig_vertex.size(); ++i) {
+      out.row(static_cast<Eigen::Index>(i)) =
+          (from_rig * rig_points.row(rig_vertex[i]).transpose()).transpose();
+    }
+    return out;
+  }
+};
+
+Points rest_points(const assets::Rig& rig) {
+  Points all(assets::num_vertices(rig), 3);
+  Eigen::Index next = 0;
+  for (const assets::Part& part : rig.parts) {
+    all.middleRows(next, part.points.rows()) = part.points;
+    next += part.points.rows();
+  }
+  return all;
+}
+
+OutputLayout make_layout(const Scene& scene, const Character& character) {
+  const assets::Rig& rig = character.rig;
+  OutputLayout layout;
+  if (scene.output_space == OutputSpace::File) layout.from_rig = rig.rig_from_file.inverse();
+  layout.order = rig.file_vertex_order ? assets::VertexOrder::File : assets::VertexOrder::Importer;
+  layout.rig_vertex.resize(static_cast<std::size_t>(assets::num_vertices(rig)));
+  for (std::size_t i = 0; i < layout.rig_vertex.size(); ++i) layout.rig_vertex[i] = static_cast<int>(i);
+  const Points rest = layout.apply(rest_points(rig));
+  if (!scene.output_mesh.empty()) {
+    assets::NamedMesh mesh = assets::read_surface(scene.output_mesh);
+    layout.rig_vertex = assets::match_rest_positions(scene.output_mesh, mesh.points, rest,
+                                                     assets::moving_together(rig, character.input.skin));
+    mesh.points = layout.apply(rest_points(rig));
+    layout.parts = {std::move(mesh)};
+    layout.order = assets::VertexOrder::OutputMesh;
+    return layout;
+  }
+  Eigen::Index next = 0;
+  for (const assets::Part& part : rig.parts) {
+    layout.parts.push_back({part.name, rest.middleRows(next, part.points.rows()), part.triangles});
+    next += part.points.rows();
+  }
+  return layout;
+}
+
+/// Triangles of all parts over all rig vertices.
+lattice::Triangles all_triangles(const assets::Rig& rig) {
+  Eigen::Index count = 0;
+  for (const auto& part : rig.parts) count += part.triangles.rows();
+  lattice::Triangles all(count, 3);
+  Eigen::Index next = 0;
+  int offset = 0;
+  for (const auto& part : rig.parts) {
+    all.middleRows(next, part.triangles.rows()) = part.triangles.array() + offset;
+    next += part.triangles.rows();
+    offset += static_cast<int>(part.points.rows());
+  }
+  return all;
+}
+
+/// One frame of the whole character in the rig's space: the flesh from the simulation, everything else
+/// skinned.
+struct CharacterFrame {
+  Points simulated, skinned;
+};
+
+CharacterFrame frame_at(const Character& character, const std::vector<Eigen::Affine3d>& pose,
+                        const Points& surface) {
+  CharacterFrame frame;
+  frame.skinned = assets::skin(character.rig, pose);
+  frame.simulated = frame.skinned;
+  const std::vector<int>& map = character.input.skin.surface_of_vertex;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (map[i] >= 0) frame.simulated.row(static_cast<Eigen::Index>(i)) = surface.row(map[i]);
+  }
+  return frame;
+}
+
+std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> posed_bones(
+    const lattice::ControlLattice& lattice, const std::vector<Eigen::Affine3d>& pose) {
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> bones;
+  for (const auto& bone : lattice.bones) {
+    bones.emplace_back(pose[static_cast<std::size_t>(bone.start.joint_a)] * bone.start.x_a,
+                       pose[static_cast<std::size_t>(bone.end.joint_b)] * bone.end.x_b);
+  }
+  return bones;
+}
+
+[[noreturn]] void fail(const Character& character, const fem::SimulationReport& report,
+                       const std::string& where) {
+  if (report.status == fem::SimulationStatus::Stopped) stop_if_interrupted(where);
+  throw NumericalError(fmt::format("{}: {}: {}", character.rig.file, where, report.message));
+}
+
+void say_what_runs(const Scene& scene, const Character& c, const FrameRange& frames) {
+  const skeleton::Clip& clip = c.the_clip();
+  const lattice::ControlLattice& l = c.lattice.lattice;
+  talk(fmt::format("{}: {:.3g} m tall, clip '{}' of {:.3g} s, frames {} to {} at {:g} fps", c.rig.file,
+                   c.rig.height, clip.name, clip.duration(), frames.first, frames.last, scene.fps));
+  std::string others;
+  for (const auto& other : c.rig.clips) {
+    if (&other != &clip) others += (others.empty() ? "" : ", ") + other.name;
+  }
+  if (scene.clip.empty() && !others.empty()) talk("other clips: " + others);
+  talk(fmt::format(
+      "lattice: {} cells, {} vertices, {} bones; flesh: E {:.3g} Pa, nu {:g}, rho {:g} kg/m^3, damping {:g} "
+      "at {:g} Hz",
+      l.complex.cells.size(), l.complex.points.rows(), l.bones.size(), c.body_options.material.young,
+      scene.poisson, scene.density, scene.damping, scene.damping_frequency));
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The files that stand beside the cache.
+void write_companions(const Scene& scene, const Character& character, const OutputLayout& layout,
+                      const RunReport& report, const fem::Body& body, const FrameRange& frames,
+                      const assets::OutputDirectory& out) {
+  out.write("skin.obj", assets::obj_text(layout.parts));
+  assets::Sidecar sidecar;
+  sidecar.version = report.version;
+  sidecar.rig_file = character.rig.file;
+  sidecar.clip = character.the_clip().name;
+  sidecar.rest_mesh = "skin.obj";
+  sidecar.cache = "skin.pc2";
+  sidecar.rest = assets::to_float(layout.apply(rest_points(character.rig)));
+  for (const auto& part : layout.parts)
+    sidecar.parts.push_back({part.name, static_cast<int>(part.points.rows())});
+  sidecar.vertex_order = layout.order;
+  sidecar.fps = scene.fps;
+  sidecar.first_frame = frames.first;
+  sidecar.num_frames = frames.last - frames.first + 1;
+  const bool si = scene.output_space == OutputSpace::Si;
+  sidecar.metres_per_unit = si ? 1.0 : character.rig.metres_per_unit;
+  sidecar.up_axis = si ? assets::UpAxis::Y : character.rig.up_axis;
+  sidecar.settings_json = nlohmann::json{{"scene_toml", report.settings}}.dump();
+  out.write("skin.json", assets::sidecar_json(sidecar));
+  out.write("lattice.vtu", assets::format_lattice(assets::LatticeFormat::Vtu, character.lattice.lattice,
+                                                  character.input.joints));
+  out.write("report.json", report_json(report, character, body));
+}
+
+/// Steps through the frames, writes the cache and keeps what the preview shows.
+std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character& character,
+                                             const fem::Body& body, fem::Simulation& simulation,
+                                             const FrameRange& frames, const OutputLayout& layout,
+                                             const std::string& cache, RunReport& report) {
+  const double t0 = character.the_clip().start;
+  const int count = frames.last - frames.first + 1;
+  const std::vector<int> shown = assets::preview_frames(count);
+  std::vector<assets::PreviewFrame> preview;
+  assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
+  Progress progress("simulating", count);
+  for (int k = 0; k < count; ++k) {
+    const int number = frames.first + k;
+    const double time = t0 + number / scene.fps;
+    const fem::SimulationReport step = simulation.advance_to(time);
+    if (step.status != fem::SimulationStatus::Ok) fail(character, step, fmt::format("frame {}", number));
+    const std::vector<Eigen::Affine3d> pose = character.pose(time);
+    const Points surface = simulation.skin_of(simulation.positions_at(time));
+    const CharacterFrame frame = frame_at(character, pose, surface);
+    try {
+      writer.write(layout.apply(frame.simulated));
+    } catch (const std::domain_error& error) {
+      throw NumericalError(
+          fmt::format("{}: frame {} at {:.6g} s: {}", character.rig.file, number, time, error.what()));
+    }
+    FrameReport f;
+    f.frame = number;
+    f.time = time;
+    f.steps = step.steps;
+    f.measures = simulation.measures_at(time);
+    f.flipped_triangles = count_flipped_triangles(body, character.input.skin.surface, surface, pose);
+    report.frames.push_back(f);
+    if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
+      preview.push_back(
+          {number, time, frame.simulated, frame.skinned, posed_bones(character.lattice.lattice, pose)});
+    }
+    progress.update(k + 1);
+  }
+  writer.finish();
+  return preview;
+}
+
+void simulate(const Scene& scene) {
+  std::unique_ptr<tbb::global_control> threads;
+  if (scene.threads > 0) {
+    threads = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                    static_cast<std::size_t>(scene.threads));
+  }
+  const assets::Overwrite overwrite =
+      scene.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse;
+  assets::OutputDirectory out(scene.output, overwrite, kOutputs);
+  const Character character = make_character(scene, talk);
+  const FrameRange frames = frame_range(scene, character.the_clip());
+  const OutputLayout layout = make_layout(scene, character);
+  say_what_runs(scene, character, frames);
+  stop_if_interrupted("before the simulation");
+
+  RunReport report;
+  report.version = SINEW_VERSION;
+  report.settings = print_scene(scene);
+  report.times = character.times;
+  auto start = std::chrono::steady_clock::now();
+  const auto lap = [&](const std::string& phase) {
+    report.times.emplace_back(phase, seconds_since(start));
+    start = std::chrono::steady_clock::now();
+  };
+  const fem::Body body = make_body(character);
+  lap("assemble");
+  const auto motion = [&](double time) { return character.pose(time); };
+  const double first = character.the_clip().start + frames.first / scene.fps;
+  fem::Simulation simulation(body, motion, first, simulation_options(scene),
+                             [] { return interrupt_signal() != 0; });
+  const fem::SimulationReport settled = simulation.settle();
+  lap("factor and settle");
+  if (settled.status != fem::SimulationStatus::Ok) fail(character, settled, "settling");
+  report.settle_steps = settled.steps;
+  report.settle_speed = settled.speed;
+  talk(
+      fmt::format("settled in {} steps; fastest flesh left {:.2g} mm/s", settled.steps, 1e3 * settled.speed));
+  const auto preview =
+      run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
+  lap("simulate and write frames");
+  assets::PreviewOptions picture;
+  picture.caption = character.the_clip().name;
+  assets::write_preview(out.file("preview.png"), all_triangles(character.rig), preview, picture);
+  lap("preview");
+  report.counts = simulation.counts();
+  write_companions(scene, character, layout, report, body, frames, out);
+  stop_if_interrupted("before the results were in place");
+  out.commit();
+
+  if (scene.json) std::cout << report_json(report, character, body);
+  double total = 0.0;
+  for (const auto& phase : report.times) total += phase.second;
+  talk(fmt::format("wrote {} frames of {} vertices to {} in {:.1f} s:", frames.last - frames.first + 1,
+                   layout.rig_vertex.size(), scene.output, total));
+  for (const std::string& name : kOutputs) talk("  " + scene.output + "/" + name);
+  talk("look at " + scene.output + "/preview.png");
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command =
+      app.add_subcommand("simulate", "Turn a rigged, animated character into frames of moving flesh");
+  const auto options = std::make_shared<SimulateOptions>();
+  options->add_to(*command);
+  command->callback([options, &context] {
+    const Scene scene = options->scene();
+    if (options->print_scene_only()) {
+      std::cout << print_scene(scene);
+    } else {
+      simulate(scene);
+    }
+    context.exit_code = 0;
+  });
+}
+
+}  // namespace sinew::tools
