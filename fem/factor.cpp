@@ -1,5 +1,6 @@
 #include "fem/factor.h"
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <vector>
@@ -150,6 +151,10 @@ Factor::Report Factor::factorise(const Eigen::SparseMatrix<double>& matrix, Prec
   lower = impl->scale.asDiagonal() * lower * impl->scale.asDiagonal();
   lower.makeCompressed();
 
+  // One at a time: METIS draws from the process's one random sequence, so that concurrent orderings would
+  // differ from run to run, and serial OpenBLAS shares its buffers between callers. Solves use neither.
+  static std::mutex one_at_a_time;
+  const std::lock_guard<std::mutex> lock(one_at_a_time);
   Common workspace;
   cholmod_sparse view = view_lower(lower);
   cholmod_factor* factor = analyse(view, workspace.common);
