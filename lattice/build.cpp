@@ -13,6 +13,7 @@
 #include "lattice/detail/lattice_points.h"
 #include "lattice/detail/optimise.h"
 #include "lattice/detail/rig_input.h"
+#include "lattice/detail/separate_limbs.h"
 #include "lattice/detail/skeleton_reduction.h"
 #include "lattice/detail/skin_samples.h"
 #include "lattice/detail/tetrahedralise.h"
@@ -119,6 +120,7 @@ ControlLattice make_attempt(const RigInput& input, double h, const Attempt& atte
   Draft draft = make_draft(input, h, attempt, samples);
   optimise(draft.points, draft.cells, draft.skeleton, input.unit_skin, samples, h);
   ControlLattice lattice = to_lattice(input, draft, h);
+  separate_limbs(input, draft.skeleton, lattice);
   hang_joints(input, draft.skeleton, lattice);
   return lattice;
 }

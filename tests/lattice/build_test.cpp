@@ -1,6 +1,9 @@
 #include "lattice/build.h"
 
+#include <algorithm>
+#include <array>
 #include <limits>
+#include <map>
 #include <set>
 
 #include <Eigen/Geometry>
@@ -8,19 +11,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/lattice/shapes.h"
+#include "tests/lattice/limbs.h"
 
 namespace sinew::lattice {
 namespace {
 
 using Eigen::Vector3d;
 
-/// A limb along y from 0 to `length`, elliptic, with joints and smooth weights between them.
-struct Limb {
-  Surface skin;
-  JointTree joints;
-};
+using Limb = tests::Character;
 
+/// An ellipsoid along y from 0 to 2 with three joints and smooth weights between the first two.
 Limb arm() {
   Limb limb;
   limb.skin = tests::blob({0, 1, 0}, 40, 24, [](const Vector3d& d) {
@@ -37,21 +37,27 @@ Limb arm() {
   return limb;
 }
 
-/// Barycentric coordinates by a linear solve: independent of the containment test of the library.
-bool is_in_some_cell(const CellComplex& complex, const Vector3d& p) {
+/// Per cell the matrix that turns (x, y, z, 1) into barycentric coordinates, by a linear solve: independent
+/// of the containment test of the library.
+std::vector<Eigen::Matrix4d> barycentric_maps(const CellComplex& complex) {
+  std::vector<Eigen::Matrix4d> maps;
   for (const Cell& cell : complex.cells) {
     Eigen::Matrix4d corners;
     for (int k = 0; k < 4; ++k) corners.col(k) << complex.points.row(cell.vertices[k]).transpose(), 1.0;
-    const Eigen::Vector4d weights = corners.partialPivLu().solve(p.homogeneous());
-    if (weights.minCoeff() > -1e-9) return true;
+    maps.push_back(corners.inverse());
   }
-  return false;
+  return maps;
 }
 
 void expect_sound(const ControlLattice& lattice, const Limb& limb) {
   EXPECT_NO_THROW(validate(lattice));
-  for (int v = 0; v < limb.skin.points.rows(); ++v)
-    EXPECT_TRUE(is_in_some_cell(lattice.complex, limb.skin.points.row(v).transpose())) << "skin vertex " << v;
+  const std::vector<Eigen::Matrix4d> maps = barycentric_maps(lattice.complex);
+  for (int v = 0; v < limb.skin.points.rows(); ++v) {
+    const Eigen::Vector4d p = Vector3d(limb.skin.points.row(v).transpose()).homogeneous();
+    EXPECT_TRUE(
+        std::any_of(maps.begin(), maps.end(), [&](const auto& m) { return (m * p).minCoeff() > -1e-9; }))
+        << "skin vertex " << v;
+  }
   for (const LatticeBone& bone : lattice.bones) {
     if (bone.soft) continue;
     EXPECT_EQ(Vector3d(lattice.complex.points.row(bone.chain.front()).transpose()), bone.rest_start)
@@ -79,6 +85,60 @@ TEST(Build, PutsBothBonesOfAnArmOnEdges) {
   EXPECT_EQ(lattice.bones[1].start.joint_a, 1);
   EXPECT_EQ(lattice.bones[0].end.joint_a, 1);
   EXPECT_THAT(lattice.frame_of_joint, testing::ElementsAre(0, 1, 1));
+}
+
+TEST(Build, HoldsRandomCharacters) {
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 rng(seed);
+    const tests::Character character = tests::random_character(rng);
+    const BuildResult result = build(character.skin, character.joints, {.cells = seed % 2 == 0 ? 150 : 500});
+    for (const GateFailure& failure : result.failures) EXPECT_TRUE(failure.tolerable) << failure.what;
+    expect_sound(result.lattice, character);
+    for (const int frame : result.lattice.frame_of_joint) EXPECT_GE(frame, 0);
+  }
+}
+
+TEST(Build, MovesEveryVertexWhereBonesMeetInOneWayOnly) {
+  std::mt19937_64 rng(7);
+  for (int i = 0; i < 8; ++i) {
+    const tests::Character character = tests::random_character(rng);
+    const ControlLattice lattice =
+        build(character.skin, character.joints, {.cells = 200, .max_retries = 0}).lattice;
+    std::map<int, int> joint_of_vertex;
+    for (const LatticeBone& bone : lattice.bones) {
+      if (bone.soft) continue;
+      for (const auto& [vertex, anchor] :
+           {std::pair(bone.chain.front(), bone.start), std::pair(bone.chain.back(), bone.end)}) {
+        EXPECT_EQ(anchor.joint_a, anchor.joint_b);
+        EXPECT_EQ(anchor.x_a, Vector3d(lattice.complex.points.row(vertex).transpose()));
+        EXPECT_EQ(joint_of_vertex.emplace(vertex, anchor.joint_a).first->second, anchor.joint_a) << bone.name;
+      }
+    }
+  }
+}
+
+TEST(Build, DoesNotGlueTwoLegsAcrossTheirGap) {
+  const tests::Character legs = tests::two_legs();
+  // Edges of about 0.14, a gap of 0.12: some cells hold skin of both legs, but most do not.
+  const BuildResult result = build(legs.skin, legs.joints, {.cells = 500});
+  EXPECT_THAT(result.failures, testing::IsEmpty());
+  expect_sound(result.lattice, legs);
+  const Points& points = result.lattice.complex.points;
+  std::set<std::array<double, 3>> places;
+  for (Eigen::Index v = 0; v < points.rows(); ++v) places.insert({points(v, 0), points(v, 1), points(v, 2)});
+  EXPECT_LT(places.size(), static_cast<std::size_t>(points.rows())) << "no vertex was doubled";
+}
+
+TEST(Build, IsTheSameInOtherUnits) {
+  const Limb limb = arm();
+  Limb scaled = limb;
+  scaled.skin.points *= 128.0;  // a power of two: rounding scales with it
+  scaled.joints.positions *= 128.0;
+  const ControlLattice a = build(limb.skin, limb.joints, {.cells = 200}).lattice;
+  const ControlLattice b = build(scaled.skin, scaled.joints, {.cells = 200}).lattice;
+  ASSERT_EQ(a.complex.points.rows(), b.complex.points.rows());
+  EXPECT_EQ(Points(128.0 * a.complex.points), b.complex.points);
 }
 
 TEST(Build, GivesTheSameBitsTwice) {

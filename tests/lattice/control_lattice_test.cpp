@@ -1,10 +1,11 @@
 #include "lattice/control_lattice.h"
 
+#include <map>
+#include <stdexcept>
+
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <map>
-#include <stdexcept>
 
 namespace sinew::lattice {
 namespace {

@@ -1,7 +1,8 @@
 #include "lattice/surface_query.h"
 
-#include <gtest/gtest.h>
 #include <limits>
+
+#include <gtest/gtest.h>
 
 #include "tests/lattice/shapes.h"
 
