@@ -243,30 +243,31 @@ SimulationReport Simulation::advance_to(double time) {
   SimulationReport total;
   total.time = state_.time;
   while (state_.time < time) {
-    const double begin = start_ + static_cast<double>(base_step_) * options_.step;
-    const double end = start_ + static_cast<double>(base_step_ + 1) * options_.step;
-    state_.time = begin;
-    now_.time = begin;
-    const int wanted = halvings_for(begin, options_.step);
-    if (wanted > halvings_ || (wanted < halvings_ && steps_since_change_ >= kStepsBetweenChanges)) {
-      halvings_ = wanted;
-      steps_since_change_ = 0;
+    if (part_ == 0) {
+      state_.time = now_.time = start_ + static_cast<double>(base_step_) * options_.step;
+      const int wanted = halvings_for(state_.time, options_.step);
+      if (wanted > halvings_ || (wanted < halvings_ && steps_since_change_ >= kStepsBetweenChanges)) {
+        halvings_ = wanted;
+        steps_since_change_ = 0;
+      }
     }
     const int parts = 1 << halvings_;
-    for (int k = 0; k < parts; ++k) {
-      const SimulationReport report = step_once(options_.step / parts);
-      ++total.steps;
-      ++steps_since_change_;
-      total.time = report.time;
-      total.status = report.status;
-      total.message = report.message;
-      if (report.status == SimulationStatus::Ok && should_stop_ && should_stop_())
-        total.status = SimulationStatus::Stopped;
-      if (total.status != SimulationStatus::Ok) return total;
+    const SimulationReport report = step_once(options_.step / parts);
+    ++total.steps;
+    ++steps_since_change_;
+    total.time = report.time;
+    total.status = report.status;
+    total.message = report.message;
+    if (report.status != SimulationStatus::Ok) return total;
+    if (++part_ == parts) {
+      part_ = 0;
+      ++base_step_;
+      state_.time = now_.time = start_ + static_cast<double>(base_step_) * options_.step;
     }
-    state_.time = end;
-    now_.time = end;
-    ++base_step_;
+    if (should_stop_ && should_stop_()) {
+      total.status = SimulationStatus::Stopped;
+      return total;
+    }
   }
   return total;
 }

@@ -83,6 +83,7 @@ class Simulation {
   bool has_before_ = false;  ///< past_ is one real step earlier.
   double last_h_ = 0.0;
   long base_step_ = 0;  ///< whole steps taken: time is start + n h, never a running sum.
+  int part_ = 0;  ///< sub-steps taken of the step under way: a frame may be sampled between two of them.
   int halvings_ = 0;
   int steps_since_change_ = 0;
 };
