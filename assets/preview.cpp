@@ -17,7 +17,9 @@ using Eigen::Vector3d;
 
 constexpr int kGap = 2;             // between tiles [pixels]
 constexpr double kFullTint = 0.04;  // of the rest height: distance from plain skinning that tints fully [-]
+constexpr double kMostTint = 0.85;  // share of the tint's own colour where it is full
 constexpr int kSubpixels = 2;       // in each direction
+const Vector3d kFollower(0.045, 0.055, 0.075);  // linear RGB of parts that are not simulated
 const Vector3d kInk(0.17, 0.20, 0.24), kPaper(0.965, 0.955, 0.94);
 
 /// Sizes that depend on the tile's.
@@ -70,16 +72,33 @@ lattice::Points all_points(const std::vector<PreviewFrame>& frames) {
   return points;
 }
 
+lattice::Points flesh(Eigen::Index num_vertices) {
+  return detail::flesh_colour().transpose().replicate(num_vertices, 1);
+}
+
+/// The colours, turned towards the tint where the points are away from plain skinning.
+lattice::Points tinted(lattice::Points colours, const lattice::Points& points, const lattice::Points& skinned,
+                       double height) {
+  if (!(height > 0.0)) return colours;
+  for (Eigen::Index v = 0; v < colours.rows(); ++v) {
+    const double away = (points.row(v) - skinned.row(v)).norm() / (kFullTint * height);
+    const double share = kMostTint * std::min(away, 1.0);
+    colours.row(v) = (1.0 - share) * colours.row(v) + share * detail::tint_colour().transpose();
+  }
+  return colours;
+}
+
 void render_tile(Image& image, int left, int top, int size, const detail::Stage& stage,
                  const detail::Body& body) {
   tbb::parallel_for(0, size, [&](int y) {
     for (int x = 0; x < size; ++x) {
+      const Vector2d shift = detail::light_shift(x, y);
       Vector3d sum = Vector3d::Zero();
       for (int sub = 0; sub < kSubpixels * kSubpixels; ++sub) {
         const Vector2d place(x + (sub % kSubpixels + 0.5) / kSubpixels,
                              y + (sub / kSubpixels + 0.5) / kSubpixels);
-        const auto seed = static_cast<unsigned>((y * size + x) * kSubpixels * kSubpixels + sub);
-        const Vector3d light = detail::radiance(stage, body, stage.camera.direction(place / size), seed);
+        const Vector3d light =
+            detail::radiance(stage, body, stage.camera.direction(place / size), {shift, sub});
         sum += light.cwiseMin(1.0);  // clipped before averaging, so that bright edges stay smooth
       }
       const Vector3d srgb = detail::encode(sum / (kSubpixels * kSubpixels));
@@ -123,9 +142,13 @@ void draw_titles(Image& image, const Layout& layout, const std::string& caption)
   for (int row = 0; row < 2; ++row)
     draw_text(image, 6 * layout.scale, layout.top(row) - layout.band + baseline, layout.scale,
               titles[static_cast<std::size_t>(row)], ink);
-  const int left = layout.width() - 6 * layout.scale - text_width(caption, layout.scale);
-  if (left > 6 * layout.scale + 2 * text_width(titles[0], layout.scale))
-    draw_text(image, left, baseline, layout.scale, caption, pale);
+  const int caption_left = layout.width() - 6 * layout.scale - text_width(caption, layout.scale);
+  const int title_end = 14 * layout.scale + text_width(titles[0], layout.scale);
+  const std::string legend = "redder: farther from plain skinning";
+  if (caption_left < title_end) return;
+  draw_text(image, caption_left, baseline, layout.scale, caption, pale);
+  if (title_end + text_width(legend, layout.scale) + 14 * layout.scale < caption_left)
+    draw_text(image, title_end, baseline, layout.scale, legend, pale);
 }
 
 void draw_labels(Image& image, const Layout& layout, int row, int column, const PreviewFrame& frame) {
@@ -143,6 +166,17 @@ void draw_labels(Image& image, const Layout& layout, int row, int column, const 
 void PreviewOptions::validate() const {
   if (tile < 64)
     throw std::invalid_argument("PreviewOptions: tile is " + std::to_string(tile) + ", expected >= 64");
+}
+
+lattice::Points role_colours(const Rig& rig) {
+  lattice::Points colours = flesh(num_vertices(rig));
+  Eigen::Index first = 0;
+  for (const Part& part : rig.parts) {
+    if (part.role != PartRole::Simulated)
+      colours.middleRows(first, part.points.rows()).rowwise() = kFollower.transpose();
+    first += part.points.rows();
+  }
+  return colours;
 }
 
 std::vector<int> preview_frames(int num_frames, int count) {
@@ -175,6 +209,9 @@ Image render_preview(const lattice::Triangles& triangles, const std::vector<Prev
   const std::vector<int> same_place = detail::coincident(turned.front().skinned);
   const lattice::Points& first = turned.front().skinned;
   const double height = first.col(1).maxCoeff() - first.col(1).minCoeff();
+  const lattice::Points base = options.colours.rows() > 0 ? options.colours : flesh(first.rows());
+  if (base.rows() != first.rows() || !base.allFinite())
+    throw std::invalid_argument("preview: one finite colour per vertex expected");
   const Layout layout(options.tile, frames.size());
   Image image(layout.width(), layout.height());
   for (std::size_t i = 0; i < image.rgb.size(); ++i)
@@ -182,14 +219,9 @@ Image render_preview(const lattice::Triangles& triangles, const std::vector<Prev
   for (int column = 0; column < layout.columns; ++column) {
     const PreviewFrame& frame = turned[static_cast<std::size_t>(column)];
     for (int row = 0; row < 2; ++row) {
-      std::vector<double> tint(same_place.size(), 0.0);
-      for (std::size_t v = 0; row == 0 && height > 0.0 && v < tint.size(); ++v) {
-        const auto i = static_cast<Eigen::Index>(v);
-        const double away = (frame.simulated.row(i) - frame.skinned.row(i)).norm();
-        tint[v] = std::min(away / (kFullTint * height), 1.0);
-      }
-      const detail::Body body = detail::make_body(row == 0 ? frame.simulated : frame.skinned, triangles,
-                                                  same_place, std::move(tint));
+      const lattice::Points& points = row == 0 ? frame.simulated : frame.skinned;
+      const detail::Body body =
+          detail::make_body(points, triangles, same_place, tinted(base, points, frame.skinned, height));
       render_tile(image, layout.left(column), layout.top(row), layout.tile, stage, body);
       draw_bones(image, layout.left(column), layout.top(row), layout.tile, stage, frame.bones);
       draw_labels(image, layout, row, column, frame);

@@ -25,10 +25,15 @@ struct PreviewOptions {
   UpAxis up_axis = UpAxis::Y;
   /// Printed at the top right, for example the names of the character and the clip.
   std::string caption = {};
+  /// Linear RGB of every vertex, num_vertices x 3; empty = flesh all over.
+  lattice::Points colours = {};
 
   /// Throws std::invalid_argument naming the field.
   void validate() const;
 };
+
+/// Colours by the roles of the parts: what is simulated looks like flesh, what only follows is dark.
+lattice::Points role_colours(const Rig& rig);
 
 /// Which of `num_frames` frames to show: at most `count`, equally spaced, the first and the last among them.
 std::vector<int> preview_frames(int num_frames, int count = 8);

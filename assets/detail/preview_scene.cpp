@@ -22,7 +22,7 @@ constexpr double kMargin = 0.06;                  // left free on each side, sha
 constexpr double kLabelMargin = 0.05;             // more room at the bottom, where the text is
 
 constexpr double kLightRadius = 0.10;  // of the light's disc at unit distance: the softness of shadows
-constexpr int kLightSamples = 6, kSkySamples = 6;
+constexpr int kLightSamples = 5, kSkySamples = 5;
 const Vector3d kLightColour(1.30, 1.20, 1.06), kSkyColour(0.50, 0.57, 0.67), kBounceColour(0.34, 0.29, 0.25);
 const Vector3d kSkin(0.70, 0.36, 0.24), kSkinAway(0.72, 0.11, 0.09);
 const Vector3d kGround(0.50, 0.49, 0.47), kGroundLine(0.38, 0.375, 0.365);
@@ -36,13 +36,10 @@ double smooth_step(double low, double high, double x) {
   return s * s * (3.0 - 2.0 * s);
 }
 
-/// Sample i of a low-discrepancy sequence in the unit square, shifted by a hash of the seed.
-Vector2d square_sample(unsigned seed, int i) {
-  unsigned h = seed * 747796405u + 2891336453u;  // permuted congruential hash
-  h = ((h >> ((h >> 28) + 4)) ^ h) * 277803737u;
-  h = (h >> 22) ^ h;
-  constexpr double kA1 = 0.7548776662466927, kA2 = 0.5698402909980532;  // plastic number
-  const double x = (h & 0xffff) / 65536.0 + kA1 * i, y = (h >> 16) / 65536.0 + kA2 * i;
+/// Sample i of a low-discrepancy sequence in the unit square.
+Vector2d square_sample(const LightSamples& samples, int i) {
+  constexpr double kA1 = 0.7548776662466927, kA2 = 0.5698402909980532;  // 1/g, 1/g^2, g the plastic number
+  const double x = samples.shift.x() + kA1 * i, y = samples.shift.y() + kA2 * i;
   return {x - std::floor(x), y - std::floor(y)};
 }
 
@@ -53,11 +50,15 @@ std::array<Vector3d, 2> tangents(const Vector3d& n) {
 }
 
 /// Share of the light's disc that is seen from p.
-double light_seen(const Stage& stage, const Body& body, const Vector3d& p, unsigned seed) {
+double light_seen(const Stage& stage, const Body& body, const Vector3d& p, const LightSamples& samples) {
+  // No ray can hit where the cone to the light passes the ball round the body.
+  const Vector3d to_body = body.centre - p;
+  const double along = to_body.dot(stage.light), reach = body.radius + kLightRadius * std::max(along, 0.0);
+  if (along < -body.radius || (to_body - along * stage.light).squaredNorm() > reach * reach) return 1.0;
   const auto [a, b] = tangents(stage.light);
   int seen = 0;
   for (int i = 0; i < kLightSamples; ++i) {
-    const Vector2d s = square_sample(seed, i);
+    const Vector2d s = square_sample(samples, samples.ray * kLightSamples + i);
     const double r = kLightRadius * std::sqrt(s.x()), angle = 2.0 * std::numbers::pi * s.y();
     const Vector3d to_light = stage.light + r * std::cos(angle) * a + r * std::sin(angle) * b;
     if (!body.mesh.is_blocked(p, to_light, 8.0 * stage.radius)) ++seen;
@@ -66,14 +67,17 @@ double light_seen(const Stage& stage, const Body& body, const Vector3d& p, unsig
 }
 
 /// Share of the sky, weighted by cosine, that is open round the normal n within a part of the scene's size.
-double sky_seen(const Stage& stage, const Body& body, const Vector3d& p, const Vector3d& n, unsigned seed) {
+double sky_seen(const Stage& stage, const Body& body, const Vector3d& p, const Vector3d& n,
+                const LightSamples& samples) {
+  const double reach = 0.35 * stage.radius;
+  if ((p - body.centre).norm() > body.radius + reach) return 1.0;
   const auto [a, b] = tangents(n);
   int seen = 0;
   for (int i = 0; i < kSkySamples; ++i) {
-    const Vector2d s = square_sample(seed ^ 0x9e3779b9u, i);
+    const Vector2d s = square_sample(samples, samples.ray * kSkySamples + i);
     const double r = std::sqrt(s.x()), angle = 2.0 * std::numbers::pi * s.y();
     const Vector3d to_sky = std::sqrt(1.0 - s.x()) * n + r * std::cos(angle) * a + r * std::sin(angle) * b;
-    if (!body.mesh.is_blocked(p, to_sky, 0.35 * stage.radius)) ++seen;
+    if (!body.mesh.is_blocked(p, to_sky, reach)) ++seen;
   }
   return static_cast<double>(seen) / kSkySamples;
 }
@@ -83,7 +87,7 @@ Vector3d background(const Vector3d& direction) {
 }
 
 Vector3d ground_radiance(const Stage& stage, const Body& body, const Vector3d& direction, double distance,
-                         unsigned seed) {
+                         const LightSamples& samples) {
   const Vector3d p = stage.camera.eye() + distance * direction;
   const Vector3d from_centre(p.x() - stage.centre.x(), 0.0, p.z() - stage.centre.z());
   const double fade = smooth_step(1.1, 3.2, from_centre.norm() / stage.radius);
@@ -93,35 +97,36 @@ Vector3d ground_radiance(const Stage& stage, const Body& body, const Vector3d& d
   const auto off_line = [&](double x) { return std::abs(x - stage.grid * std::round(x / stage.grid)); };
   const bool on_line = off_line(p.x()) < line || off_line(p.z()) < line;
   const Vector3d lifted = p + 1e-4 * stage.radius * Vector3d::UnitY();
-  const double key = stage.light.y() * light_seen(stage, body, lifted, seed);
-  const double open = sky_seen(stage, body, lifted, Vector3d::UnitY(), seed);
+  const double key = stage.light.y() * light_seen(stage, body, lifted, samples);
+  const double open = sky_seen(stage, body, lifted, Vector3d::UnitY(), samples);
   const Vector3d colour =
       (on_line ? kGroundLine : kGround).cwiseProduct(key * kLightColour + open * kSkyColour);
   return mix(colour, background(direction), fade);
 }
 
 Vector3d body_radiance(const Stage& stage, const Body& body, const Vector3d& direction,
-                       const RayMesh::Hit& hit, unsigned seed) {
+                       const RayMesh::Hit& hit, const LightSamples& samples) {
   const Eigen::RowVector3i corners = body.triangles.row(hit.triangle);
   const std::array<double, 3> weights = {1.0 - hit.u - hit.v, hit.u, hit.v};
   Vector3d normal = Vector3d::Zero();
-  double tint = 0.0;
+  Vector3d albedo = Vector3d::Zero();
   for (int c = 0; c < 3; ++c) {
     const auto k = static_cast<std::size_t>(c);
     normal += weights[k] * body.corner_normals.row(3 * hit.triangle + c).transpose();
-    tint += weights[k] * body.tint[static_cast<std::size_t>(corners[c])];
+    albedo += weights[k] * body.colours.row(corners[c]).transpose();
   }
   normal.normalize();
-  if (normal.dot(direction) > 0.0) normal = -normal;  // open sheets are seen from both sides
+  // Open sheets are seen from both sides. The flat normal decides: the smooth one may lean away at an
+  // outline.
+  if (hit.normal.dot(direction) > 0.0) normal = -normal;
   const Vector3d p = stage.camera.eye() + hit.distance * direction + 1e-3 * stage.radius * normal;
   const double facing = normal.dot(stage.light);
-  const double seen = facing > -0.2 ? light_seen(stage, body, p, seed) : 0.0;
+  const double seen = facing > -0.2 ? light_seen(stage, body, p, samples) : 0.0;
   // Flesh scatters light a little round the edge of the shadow: wrap it by 0.2.
   const double key = seen * std::max((facing + 0.2) / 1.2, 0.0);
-  const double open = sky_seen(stage, body, p, normal, seed);
+  const double open = sky_seen(stage, body, p, normal, samples);
   const double upward = 0.5 + 0.5 * normal.y();
   const Vector3d ambient = open * mix(kBounceColour, kSkyColour, upward);
-  const Vector3d albedo = mix(kSkin, kSkinAway, 0.85 * tint);
   const double grazing = 1.0 - std::abs(normal.dot(direction));
   const double shine = std::pow(std::max(normal.dot((stage.light - direction).normalized()), 0.0), 30.0);
   return albedo.cwiseProduct(key * kLightColour + ambient) + 0.10 * seen * shine * kLightColour +
@@ -201,7 +206,7 @@ std::vector<int> coincident(const lattice::Points& points) {
 }
 
 Body make_body(const lattice::Points& points, const lattice::Triangles& triangles,
-               const std::vector<int>& same_place, std::vector<double> tint) {
+               const std::vector<int>& same_place, lattice::Points colours) {
   const Eigen::Index n = triangles.rows();
   lattice::Points areas(n, 3), units(n, 3);
   std::vector<std::vector<int>> around(same_place.size());
@@ -226,17 +231,33 @@ Body make_body(const lattice::Points& points, const lattice::Triangles& triangle
       normals.row(3 * t + k) = (sum.norm() > 0.0 ? Vector3d(sum.normalized()) : fallback).transpose();
     }
   }
-  return {RayMesh(points, triangles), triangles, normals, std::move(tint)};
+  const Vector3d low = points.colwise().minCoeff(), high = points.colwise().maxCoeff();
+  return {RayMesh(points, triangles), triangles,          normals,
+          std::move(colours),         0.5 * (low + high), 0.5 * (high - low).norm()};
 }
 
-Vector3d radiance(const Stage& stage, const Body& body, const Vector3d& direction, unsigned seed) {
+Vector2d light_shift(int x, int y) {
+  // Interleaved gradient noise [Jimenez14], and once more at another place for the second coordinate.
+  const auto noise = [](double a, double b) {
+    const double inner = 0.06711056 * a + 0.00583715 * b;
+    const double outer = 52.9829189 * (inner - std::floor(inner));
+    return outer - std::floor(outer);
+  };
+  return {noise(x, y), noise(x + 47.0, y + 17.0)};
+}
+
+Vector3d radiance(const Stage& stage, const Body& body, const Vector3d& direction,
+                  const LightSamples& samples) {
   if (const auto hit = body.mesh.first_hit(stage.camera.eye(), direction))
-    return body_radiance(stage, body, direction, *hit, seed);
+    return body_radiance(stage, body, direction, *hit, samples);
   const double height = stage.camera.eye().y() - stage.ground;
   if (direction.y() < 0.0 && height > 0.0)
-    return ground_radiance(stage, body, direction, -height / direction.y(), seed);
+    return ground_radiance(stage, body, direction, -height / direction.y(), samples);
   return background(direction);
 }
+
+Vector3d flesh_colour() { return kSkin; }
+Vector3d tint_colour() { return kSkinAway; }
 
 Vector3d encode(const Vector3d& linear) {
   Vector3d srgb;

@@ -45,7 +45,9 @@ struct Body {
   RayMesh mesh;
   lattice::Triangles triangles;
   lattice::Points corner_normals;  ///< 3 per triangle, unit, smooth except over sharp edges.
-  std::vector<double> tint;        ///< per vertex, in [0, 1].
+  lattice::Points colours;         ///< per vertex, linear RGB.
+  Eigen::Vector3d centre;          ///< of a ball that holds the body [m].
+  double radius;                   ///< of that ball [m].
 };
 
 /// Which vertices stand at the same place, as class indices: copies along seams must be shaded as one.
@@ -53,11 +55,25 @@ std::vector<int> coincident(const lattice::Points& points);
 
 /// `same_place` from coincident().
 Body make_body(const lattice::Points& points, const lattice::Triangles& triangles,
-               const std::vector<int>& same_place, std::vector<double> tint);
+               const std::vector<int>& same_place, lattice::Points colours);
 
-/// Linear light that arrives from `direction` (unit). `seed` chooses the light samples.
+/// Linear RGB of flesh, and of flesh that is as far from plain skinning as the tint tells apart.
+Eigen::Vector3d flesh_colour();
+Eigen::Vector3d tint_colour();
+
+/// Which of the light's samples a ray takes. The rays of one pixel share the shift and count on, so that
+/// together they cover the light evenly.
+struct LightSamples {
+  Eigen::Vector2d shift;  ///< in the unit square.
+  int ray;                ///< number of the ray in its pixel.
+};
+
+/// The shift of a pixel: neighbours differ, so that what is left of the noise is fine and even.
+Eigen::Vector2d light_shift(int x, int y);
+
+/// Linear light that arrives from `direction` (unit).
 Eigen::Vector3d radiance(const Stage& stage, const Body& body, const Eigen::Vector3d& direction,
-                         unsigned seed);
+                         const LightSamples& samples);
 
 /// sRGB in [0, 1] of linear light.
 Eigen::Vector3d encode(const Eigen::Vector3d& linear);

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
 
 #include "assets/error.h"
 
@@ -36,8 +37,7 @@ struct RayMesh::Impl {
 
 RayMesh::RayMesh(const lattice::Points& points, const lattice::Triangles& triangles)
     : impl_(std::make_unique<Impl>()) {
-  // One thread builds the tree, so that it is the same tree on every machine.
-  impl_->device = rtcNewDevice("threads=1,set_affinity=0");
+  impl_->device = rtcNewDevice("set_affinity=0");
   if (impl_->device == nullptr) throw LimitError("preview: the ray tracer does not start");
   impl_->scene = rtcNewScene(impl_->device);
   rtcSetSceneFlags(impl_->scene, RTC_SCENE_FLAG_ROBUST);
@@ -57,7 +57,9 @@ RayMesh::RayMesh(const lattice::Points& points, const lattice::Triangles& triang
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(impl_->scene, geometry);
   rtcReleaseGeometry(geometry);
-  rtcCommitScene(impl_->scene);
+  // One thread builds the tree, so that it is the same tree on every machine. Not by the device's own option:
+  // that holds all of TBB to one thread for as long as the device lives.
+  tbb::task_arena(1).execute([&] { rtcCommitScene(impl_->scene); });
 }
 
 RayMesh::~RayMesh() = default;
@@ -73,7 +75,11 @@ std::optional<RayMesh::Hit> RayMesh::first_hit(const Eigen::Vector3d& origin,
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(impl_->scene, &context, &query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return Hit{static_cast<int>(query.hit.primID), query.ray.tfar, query.hit.u, query.hit.v};
+  return Hit{static_cast<int>(query.hit.primID),
+             query.ray.tfar,
+             query.hit.u,
+             query.hit.v,
+             {query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z}};
 }
 
 bool RayMesh::is_blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,

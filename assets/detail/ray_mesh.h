@@ -17,8 +17,9 @@ class RayMesh {
 
   struct Hit {
     int triangle;
-    double distance;  ///< in lengths of `direction`.
-    double u, v;      ///< barycentric weights of the triangle's second and third corner.
+    double distance;         ///< in lengths of `direction`.
+    double u, v;             ///< barycentric weights of the triangle's second and third corner.
+    Eigen::Vector3d normal;  ///< of the flat triangle, not unit; outward where it turns counter-clockwise.
   };
   std::optional<Hit> first_hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
   /// Whether anything lies between the origin and `reach` lengths of `direction`.

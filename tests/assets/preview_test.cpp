@@ -88,15 +88,46 @@ TEST(Preview, ShowsTheSimulationAboveThePlainSkinning) {
 }
 
 TEST(Preview, DoesNotDependOnTheNumberOfThreads) {
-  const Box box;
-  const std::vector<PreviewFrame> frames = {frame_of(1.1 * box.points, box.points)};
+  // A wavy sheet of 20000 triangles: large enough for the ray tracer to build its tree in parallel if it
+  // could.
+  constexpr int kSide = 101;
+  lattice::Points sheet(kSide * kSide, 3);
+  lattice::Triangles triangles(2 * (kSide - 1) * (kSide - 1), 3);
+  Eigen::Index t = 0;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const double x = 0.02 * (i % kSide), z = 0.02 * (i / kSide);
+    sheet.row(i) << x, 0.1 * std::sin(7 * x) * std::cos(5 * z), z;
+    if (i % kSide == kSide - 1 || i / kSide == kSide - 1) continue;
+    triangles.row(t++) << i, i + kSide, i + 1;
+    triangles.row(t++) << i + 1, i + kSide, i + kSide + 1;
+  }
+  const std::vector<PreviewFrame> frames = {frame_of(1.1 * sheet, sheet)};
   const auto render = [&](std::size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return render_preview(box.triangles, frames, {.tile = kTile}).rgb;
+    return render_preview(triangles, frames, {.tile = kTile}).rgb;
   };
   const auto one = render(1);
   EXPECT_EQ(one, render(2));
   EXPECT_EQ(one, render(4));
+}
+
+TEST(Preview, TakesTheColoursOfTheVertices) {
+  const Box box;
+  const std::vector<PreviewFrame> frames = {frame_of(box.points, box.points)};
+  const Image flesh = render_preview(box.triangles, frames, {.tile = kTile});
+  Rig rig;
+  rig.parts.resize(1);
+  rig.parts[0].points = box.points;
+  rig.parts[0].role = PartRole::Simulated;
+  EXPECT_EQ(render_preview(box.triangles, frames, {.tile = kTile, .colours = role_colours(rig)}).rgb,
+            flesh.rgb);
+  rig.parts[0].role = PartRole::Rigid;
+  const Image follower = render_preview(box.triangles, frames, {.tile = kTile, .colours = role_colours(rig)});
+  // In the middle of the tile stands the box: dark now.
+  const std::size_t middle = static_cast<std::size_t>(3 * ((kTop + kTile / 2) * flesh.width + kTile / 2));
+  EXPECT_LT(2 * follower.rgb[middle], flesh.rgb[middle]);
+  EXPECT_THROW(render_preview(box.triangles, frames, {.tile = kTile, .colours = lattice::Points::Zero(7, 3)}),
+               std::invalid_argument);
 }
 
 TEST(Preview, TurnsFilesWithZUpUpright) {
@@ -167,13 +198,13 @@ TEST(PreviewNormals, AreSmoothAcrossCopiedVerticesAndSharpOverABoxEdge) {
   lattice::Triangles triangles(2, 3);
   triangles << 0, 1, 2, 3, 4, 5;
   const detail::Body body =
-      detail::make_body(points, triangles, detail::coincident(points), std::vector<double>(6));
+      detail::make_body(points, triangles, detail::coincident(points), lattice::Points::Zero(6, 3));
   EXPECT_EQ(body.corner_normals.row(0), body.corner_normals.row(3));
   EXPECT_EQ(body.corner_normals.row(2), body.corner_normals.row(4));
   // A box: every corner keeps its face's normal.
   const Box box;
-  const detail::Body cube =
-      detail::make_body(box.points, box.triangles, detail::coincident(box.points), std::vector<double>(8));
+  const detail::Body cube = detail::make_body(box.points, box.triangles, detail::coincident(box.points),
+                                              lattice::Points::Zero(8, 3));
   for (int corner = 0; corner < 3; ++corner)
     EXPECT_EQ(cube.corner_normals.row(corner), Eigen::RowVector3d(0, 0, -1));
 }
