@@ -3,6 +3,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <set>
 
 #include <fcntl.h>
@@ -178,6 +179,35 @@ TEST_F(AtomicOutput, WhatAKilledProcessLeftIsRemovedByTheNext) {
     EXPECT_THAT(entries(), ElementsAre(own, own + "/.writing"));
   }
   EXPECT_THAT(entries(), IsEmpty());
+}
+
+TEST_F(AtomicOutput, AWriterKilledAtAnyMomentNeverLeavesAMixture) {
+  // A child overwrites the same folder again and again, each time with files that must agree; it is killed
+  // after a time that differs from round to round. What stands under the final name is whole every time.
+  std::mt19937_64 rng(20021);
+  int rounds_with_output = 0;
+  for (int round = 0; round < 40; ++round) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      for (int run = 0;; ++run) {
+        OutputDirectory out(at("run"), Overwrite::Replace, own_);
+        const std::string content =
+            std::to_string(round) + "/" + std::to_string(run) + std::string(5000, '.');
+        for (const std::string& name : own_) put(out.file(name), content);
+        out.commit();
+      }
+    }
+    ::usleep(static_cast<useconds_t>(rng() % 80000));
+    ::kill(child, SIGKILL);
+    ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+    if (!fs::exists(at("run"))) continue;
+    ++rounds_with_output;
+    ASSERT_EQ(get(at("run/skin.pc2")), get(at("run/skin.json")));
+    ASSERT_GE(get(at("run/skin.pc2")).size(), 5000u);
+  }
+  EXPECT_GT(rounds_with_output, 0);
+  { OutputDirectory(at("run"), Overwrite::Replace, own_); }
+  EXPECT_THAT(entries(), ElementsAre("run", "run/skin.json", "run/skin.pc2"));
 }
 
 TEST_F(AtomicOutput, AnEarlierRunThatWasMovedAsideComesBack) {
