@@ -16,8 +16,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr int kGap = 2;             // between tiles [pixels]
-constexpr double kFullTint = 0.04;  // of the rest height: distance from plain skinning that tints fully [-]
-constexpr double kMostTint = 0.85;  // share of the tint's own colour where it is full
+constexpr double kFullTint = 0.06;  // of the rest height: distance from plain skinning that tints fully [-]
+constexpr double kMostTint = 0.65;  // share of the tint's own colour where it is full
 constexpr int kSubpixels = 2;       // in each direction
 const Vector3d kFollower(0.045, 0.055, 0.075);  // linear RGB of parts that are not simulated
 const Vector3d kInk(0.17, 0.20, 0.24), kPaper(0.965, 0.955, 0.94);
@@ -113,8 +113,8 @@ void draw_bones(Image& image, int left, int top, int size, const detail::Stage& 
                 const std::vector<std::pair<Vector3d, Vector3d>>& bones) {
   const Window window{left, top, left + size, top + size};
   const double unit = size / 320.0;
-  const Pen outline{kInk, 0.45, 3.4 * unit}, core{{0.99, 0.98, 0.94}, 0.9, 1.7 * unit};
-  const Pen joint_outline{kInk, 0.55, 6.2 * unit}, joint{{0.16, 0.55, 0.58}, 1.0, 4.4 * unit};
+  const Pen outline{kInk, 0.35, 2.9 * unit}, core{{0.99, 0.98, 0.94}, 0.9, 1.4 * unit};
+  const Pen joint_outline{kInk, 0.5, 4.8 * unit}, joint{{0.16, 0.55, 0.58}, 1.0, 3.4 * unit};
   std::vector<std::pair<Vector2d, Vector2d>> segments;
   for (const auto& [a, b] : bones) {
     Vector2d pa, pb;

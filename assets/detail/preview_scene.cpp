@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 // The camera stands 35 degrees off the front and looks down by 13; a long lens keeps proportions.
 constexpr double kYaw = 35.0, kElevation = 13.0;  // [degrees]
 constexpr double kHalfView = 0.20;                // tangent of half the field of view
-constexpr double kMargin = 0.06;                  // left free on each side, share of the picture
+constexpr double kMargin = 0.04;                  // left free on each side, share of the picture
 constexpr double kLabelMargin = 0.05;             // more room at the bottom, where the text is
 
 constexpr double kLightRadius = 0.10;  // of the light's disc at unit distance: the softness of shadows

@@ -171,12 +171,12 @@ TEST(PreviewCamera, ShowsEverythingAndLeavesNoMoreRoomThanItsMargins) {
       low = low.cwiseMin(place);
       high = high.cwiseMax(place);
     }
-    // 6 % left free on every side and 5 % more at the bottom (place.y points down); either the width or the
+    // 4 % left free on every side and 5 % more at the bottom (place.y points down); either the width or the
     // height is used up to rounding: positions of about 100 lose 14 of 53 bits more than the picture's.
-    EXPECT_GE(low.minCoeff(), 0.06 - 1e-9);
-    EXPECT_LE(high.x(), 0.94 + 1e-9);
-    EXPECT_LE(high.y(), 0.89 + 1e-9);
-    EXPECT_NEAR(std::max((high.x() - low.x()) / 0.88, (high.y() - low.y()) / 0.83), 1.0, 1e-9);
+    EXPECT_GE(low.minCoeff(), 0.04 - 1e-9);
+    EXPECT_LE(high.x(), 0.96 + 1e-9);
+    EXPECT_LE(high.y(), 0.91 + 1e-9);
+    EXPECT_NEAR(std::max((high.x() - low.x()) / 0.92, (high.y() - low.y()) / 0.87), 1.0, 1e-9);
   }
 }
 
