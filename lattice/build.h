@@ -31,17 +31,18 @@ struct GateFailure {
 };
 
 struct BuildResult {
-  ControlLattice lattice;             ///< the best attempt: fewest intolerable failures, then fewest failures.
+  ControlLattice lattice;  ///< the best attempt: fewest intolerable failures, then fewest failures.
   std::vector<GateFailure> failures;  ///< of that attempt.
 };
 
-/// Builds a lattice of tetrahedra round `skin` in which the bones of `joints` are chains of edges. Deterministic.
-/// `skin.weights` name joints of the tree. Throws std::invalid_argument where there is no triangle, no joint or
-/// no weight at all, or a coordinate is not finite.
+/// Builds a lattice of tetrahedra round `skin` in which the bones of `joints` are chains of edges.
+/// Deterministic. `skin.weights` name joints of the tree. Throws std::invalid_argument where there is no
+/// triangle, no joint or no weight at all, or a coordinate is not finite.
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options = {});
 
 /// Quality of any lattice against a skin, and the gate on it.
 LatticeQuality measure_quality(const ControlLattice& lattice, const Surface& skin);
-std::vector<GateFailure> check_gate(const ControlLattice& lattice, const Surface& skin, const BuildOptions& options);
+std::vector<GateFailure> check_gate(const ControlLattice& lattice, const Surface& skin,
+                                    const BuildOptions& options);
 
 }  // namespace sinew::lattice

@@ -8,8 +8,8 @@
 
 #include "lattice/points.h"
 
-/// The control lattice: a coarse complex of convex cells round the skin in which every hard bone is a chain of
-/// edges ([Capell02, sec. 4.1], DESIGN section 3).
+/// The control lattice: a coarse complex of convex cells round the skin in which every hard bone is a chain
+/// of edges ([Capell02, sec. 4.1], DESIGN section 3).
 namespace sinew::lattice {
 
 /// Shapes in which every vertex has valence 3, so that one subdivision gives one hexahedron per corner.
@@ -39,8 +39,8 @@ struct CellComplex {
 /// A rest point whose posed position is (1-s) T_a X_a + s T_b X_b, with T the joint's affine map from rest to
 /// now (DESIGN section 2). A vertex on a tip bone has joint_a == joint_b.
 struct BoneAnchor {
-  int joint_a = -1;         ///< joint index of the rig.
-  int joint_b = -1;         ///< joint index of the rig.
+  int joint_a = -1;              ///< joint index of the rig.
+  int joint_b = -1;              ///< joint index of the rig.
   Eigen::Vector3d x_a{0, 0, 0};  ///< rest point carried by joint_a [m].
   Eigen::Vector3d x_b{0, 0, 0};  ///< rest point carried by joint_b [m].
 };
@@ -65,7 +65,7 @@ struct LatticeBone {
 /// A frame on which flesh hangs without any bone: a weighted joint with no room for a tip bone. Held by a
 /// penalty ball round its position.
 struct SoftFrame {
-  int frame = -1;                    ///< joint index.
+  int frame = -1;                     ///< joint index.
   Eigen::Vector3d position{0, 0, 0};  ///< rest [m].
 };
 
@@ -81,19 +81,19 @@ struct LatticeQuality {
   double min_dihedral_degrees = 0.0;
   /// Smallest scaled Jacobian of the level-1 hexahedra (a regular tetrahedron gives 0.707).
   double min_scaled_jacobian = 0.0;
-  double min_volume = 0.0;            ///< [m^3].
-  double volume_ratio = 0.0;          ///< lattice volume / skin volume (by winding number).
+  double min_volume = 0.0;    ///< [m^3].
+  double volume_ratio = 0.0;  ///< lattice volume / skin volume (by winding number).
   int skin_vertices_outside = 0;
-  int skin_triangles_outside = 0;     ///< triangles that leave the lattice though their vertices are inside.
-  bool exact_chains = true;           ///< every hard bone is a chain of edges.
-  int components = 0;                 ///< connected components of cells.
+  int skin_triangles_outside = 0;  ///< triangles that leave the lattice though their vertices are inside.
+  bool exact_chains = true;        ///< every hard bone is a chain of edges.
+  int components = 0;              ///< connected components of cells.
   int components_without_bone = 0;
 };
 
 /// The whole product of the builder or of a reader.
 struct ControlLattice {
   CellComplex complex;
-  std::vector<LatticeBone> bones;      ///< hard and soft.
+  std::vector<LatticeBone> bones;  ///< hard and soft.
   std::vector<SoftFrame> soft_frames;
   std::vector<SkeletonChange> changes;
   LatticeQuality quality;
@@ -107,8 +107,8 @@ struct ControlLattice {
 /// Edges of a cell as pairs of corners; 6, 9 or 12 of them.
 std::span<const std::array<int, 2>> cell_edges(CellType type);
 
-/// Faces of a cell as corners, counter-clockwise seen from outside a cell of positive volume; the fourth corner of
-/// a triangle is -1. 4, 5 or 6 of them.
+/// Faces of a cell as corners, counter-clockwise seen from outside a cell of positive volume; the fourth
+/// corner of a triangle is -1. 4, 5 or 6 of them.
 std::span<const std::array<int, 4>> cell_faces(CellType type);
 
 /// Signed volume of a cell [m^3]: positive for VTK's orientation. Hexahedra and wedges by splitting into
