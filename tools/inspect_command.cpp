@@ -189,6 +189,10 @@ ordered_json clips_json(const Inspection& inspection) {
   return list;
 }
 
+std::string counted(std::size_t count, const std::string& thing) {
+  return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
+}
+
 std::string parts_text(const assets::Rig& rig) {
   std::size_t width = 4;
   for (const Part& part : rig.parts) width = std::max(width, std::min<std::size_t>(part.name.size(), 40));
@@ -230,6 +234,9 @@ std::string bones_text(const Inspection& inspection) {
       fmt::format("\nBones of a lattice of default size: {}, of them {} soft and {} tip bones\n",
                   inspection.bones.size(), soft, tips);
   for (const lattice::SkeletonChange& change : inspection.changes) {
+    const int joint = inspection.rig.skeleton.find(change.joint);
+    // Joints without a bone stand above with their reason.
+    if (joint >= 0 && inspection.joints[static_cast<std::size_t>(joint)].bones.empty()) continue;
     text += fmt::format("  '{}' {}: {}\n", change.joint, change.what, change.reason);
   }
   return text;
@@ -286,13 +293,15 @@ std::string inspection_text(const Inspection& inspection) {
   std::string text = fmt::format("{} ({})\n", single_line(rig.file), rig.format);
   text += fmt::format("  height    {:.3f} m (1 unit of the file = {:.6g} m), up axis {}\n", rig.height,
                       rig.metres_per_unit, word(rig.up_axis));
-  text += fmt::format("  mesh      {} parts, {} vertices in {} order, {} triangles\n", rig.parts.size(),
-                      assets::num_vertices(rig), rig.file_vertex_order ? "the file's" : "the importer's",
-                      num_triangles);
-  text += fmt::format("  skeleton  {} joints, {} with skin weight\n", inspection.joints.size(), weighted);
-  text += inspection.clip < 0 ? std::string("  motion    none\n")
-                              : fmt::format("  motion    {} clips; '{}' is taken\n", rig.clips.size(),
-                                            rig.clips[static_cast<std::size_t>(inspection.clip)].name);
+  text += fmt::format("  mesh      {}, {} vertices in {} order, {} triangles\n",
+                      counted(rig.parts.size(), "part"), assets::num_vertices(rig),
+                      rig.file_vertex_order ? "the file's" : "the importer's", num_triangles);
+  text += fmt::format("  skeleton  {}, {} with skin weight\n", counted(inspection.joints.size(), "joint"),
+                      weighted);
+  text += inspection.clip < 0
+              ? std::string("  motion    none\n")
+              : fmt::format("  motion    {}; '{}' is taken\n", counted(rig.clips.size(), "clip"),
+                            rig.clips[static_cast<std::size_t>(inspection.clip)].name);
   if (!rig.parts.empty()) text += parts_text(rig);
   if (!inspection.joints.empty()) {
     text += "\nJoints (share of the skin's weight, bones of the lattice)\n" + joint_tree(inspection);

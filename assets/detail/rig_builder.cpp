@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
 #include <utility>
 
 #include "assets/detail/part_copies.h"
 #include "assets/detail/rest_pose.h"
+#include "assets/detail/skin_report.h"
 #include "assets/detail/skin_weights.h"
 #include "assets/detail/text.h"
 #include "assets/detail/units.h"
@@ -25,7 +27,9 @@ class Names {
   std::string take(const std::string& wish, const std::string& otherwise) {
     const std::string base = wish.empty() ? otherwise : printable(wish);
     std::string name = base;
-    for (int i = 2; !taken_.insert(name).second; ++i) name = base + "_" + std::to_string(i);
+    // Counting on from the last number keeps a file that uses one name ten thousand times linear.
+    int& number_used = last_number_.try_emplace(base, 1).first->second;
+    while (!taken_.insert(name).second) name = base + "_" + std::to_string(++number_used);
     if (wish.empty()) ++num_invented;
     if (!wish.empty() && name != base) ++num_changed;
     return name;
@@ -35,6 +39,7 @@ class Names {
 
  private:
   std::set<std::string> taken_;
+  std::map<std::string, int> last_number_;
 };
 
 class RigBuilder {
@@ -58,6 +63,7 @@ class RigBuilder {
     for (std::size_t c = 0; c < scene_.clips.size(); ++c) make_clip(c);
     rig_.findings.insert(rig_.findings.begin(), scene_.findings.begin(), scene_.findings.end());
     bind_coincident_copies(rig_);
+    report_skin(rig_);
     judge();
     return std::move(rig_);
   }
@@ -357,7 +363,8 @@ class RigBuilder {
     const auto num_flesh = std::count_if(rig_.parts.begin(), rig_.parts.end(), is_flesh);
     if (num_flesh == 0) {
       find(Finding::Severity::Error, "no-skin", "",
-           rig_.parts.empty() ? "the file holds no mesh" : "none of the file's meshes is bound to a skeleton",
+           !rig_.parts.empty() ? "none of the file's meshes is bound to a skeleton"
+                               : "the file holds no mesh of triangles" + what_was_left_out(),
            "export the character's mesh with its skin weights, skeleton and animation in one file");
     }
     std::vector<std::string> moving;
@@ -374,6 +381,16 @@ class RigBuilder {
                " is taken unless --clip names another");
     }
     if (num_flesh > 0) judge_joints();
+  }
+
+  /// Points, lines and empty meshes, for a file that holds nothing else.
+  std::string what_was_left_out() const {
+    std::string list;
+    for (const Finding& finding : rig_.findings) {
+      if (finding.code != "points-ignored" && finding.code != "lines-ignored") continue;
+      list += (list.empty() ? ": " : ", ") + finding.message;
+    }
+    return list;
   }
 
   void judge_joints() {
