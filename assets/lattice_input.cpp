@@ -1,5 +1,6 @@
 #include "assets/lattice_input.h"
 
+#include "assets/detail/text.h"
 #include "assets/error.h"
 
 namespace sinew::assets {
@@ -12,6 +13,14 @@ LatticeInput lattice_input(const Rig& rig) {
                      "skin: no triangle hangs on a joint, got " + std::to_string(rig.parts.size()) +
                          " parts without flesh, expected a mesh with skin weights; hint: bind the mesh "
                          "to the skeleton before exporting");
+  }
+  const lattice::Points& points = input.skin.surface.points;
+  const double diagonal = (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
+  const double thin = thickness(points);
+  if (!(thin > kFlatSkin * diagonal)) {
+    throw InputError(rig.file, "skin: is flat and holds no flesh, got a thickness of " +
+                                   detail::number(thin) + " m, expected more than " +
+                                   detail::number(kFlatSkin * diagonal) + " m; hint: give the mesh a volume");
   }
   const skeleton::Skeleton& skeleton = rig.skeleton;
   input.joints.positions.resize(skeleton.num_joints(), 3);

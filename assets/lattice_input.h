@@ -13,7 +13,8 @@ struct LatticeInput {
   lattice::JointTree joints;
 };
 
-/// Turns a rig into the builder's input. Throws InputError where no part is simulated.
+/// Turns a rig into the builder's input. Throws InputError where no part is simulated or the
+/// skin is flat.
 LatticeInput lattice_input(const Rig& rig);
 
 }  // namespace sinew::assets

@@ -7,6 +7,8 @@
 #include <map>
 #include <stdexcept>
 
+#include <Eigen/Eigenvalues>
+
 #include "assets/error.h"
 
 namespace sinew::assets {
@@ -166,6 +168,14 @@ PhysicsSkin physics_skin(const Rig& rig) {
     }
   }
   return result;
+}
+
+double thickness(const lattice::Points& points) {
+  if (points.rows() < 2) return 0.0;
+  const lattice::Points centred = points.rowwise() - points.colwise().mean();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(centred.transpose() * centred);
+  const Eigen::VectorXd along = centred * axes.eigenvectors().col(0);
+  return along.maxCoeff() - along.minCoeff();
 }
 
 int choose_clip(const Rig& rig, const std::string& name) {

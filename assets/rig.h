@@ -76,6 +76,13 @@ struct PhysicsSkin {
 };
 PhysicsSkin physics_skin(const Rig& rig);
 
+/// Extent of a surface along its thinnest principal axis [m]: 0 for a plane, whichever way it stands.
+double thickness(const lattice::Points& points);
+
+/// A skin thinner than this share of its diagonal holds no flesh: physics refuses it. Clothes of 1 mm on a
+/// person would be three times as thick.
+inline constexpr double kFlatSkin = 2e-4;
+
 struct LoadOptions {
   /// Height of the character [m]; 0 = guess the units (DESIGN section 4).
   double height = 0.0;

@@ -271,7 +271,9 @@ Inspection inspect(const std::string& file, const assets::LoadOptions& options) 
   weigh_joints(result);
   const bool has_flesh = std::any_of(result.rig.parts.begin(), result.rig.parts.end(),
                                      [](const Part& part) { return part.role == PartRole::Simulated; });
-  if (has_flesh) find_bones(result);
+  const bool is_flat = std::any_of(result.rig.findings.begin(), result.rig.findings.end(),
+                                   [](const Finding& finding) { return finding.code == "flat-skin"; });
+  if (has_flesh && !is_flat) find_bones(result);
   find_reasons(result);
   try {
     result.clip = assets::choose_clip(result.rig, "");

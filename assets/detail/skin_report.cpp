@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "assets/detail/text.h"
+
 namespace sinew::assets::detail {
 
 namespace {
@@ -97,6 +99,14 @@ void report_skin(Rig& rig) {
   }
   const lattice::Surface surface = physics_skin(bare).surface;
   if (surface.triangles.rows() == 0) return;
+  const double diagonal = (surface.points.colwise().maxCoeff() - surface.points.colwise().minCoeff()).norm();
+  const double thin = thickness(surface.points);
+  if (!(thin > kFlatSkin * diagonal)) {
+    rig.findings.push_back({Finding::Severity::Error, "flat-skin", "",
+                            "the skin is flat and holds no flesh: " + number(thin) +
+                                " m thick, expected more than " + number(kFlatSkin * diagonal) + " m",
+                            "give the mesh a volume"});
+  }
   const EdgeCounts edges = count_edges(surface);
   if (edges.open > 0) {
     rig.findings.push_back(

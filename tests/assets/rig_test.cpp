@@ -26,6 +26,7 @@ skeleton::Joint joint(const std::string& name, int parent, const Eigen::Vector3d
   return j;
 }
 
+/// Three points of a plane; a fourth makes it a body.
 Part triangle_part(const std::string& name, PartRole role) {
   Part part;
   part.name = name;
@@ -182,8 +183,42 @@ TEST(PhysicsSkin, LeavesOutPartsThatAreNotSimulatedAndDegenerateTriangles) {
   EXPECT_EQ(physics.surface_of_vertex, (std::vector<int>{0, 1, 2, -1, -1, -1, -1, -1, -1}));
 }
 
+/// small_rig() with a fourth point above its flesh.
+Rig solid_rig() {
+  Rig rig = small_rig();
+  Part& flesh = rig.parts[0];
+  flesh.points.conservativeResize(4, 3);
+  flesh.points.row(3) << 0, 0, 1;
+  flesh.weights.push_back({{0, 1.0}});
+  return rig;
+}
+
+TEST(Thickness, IsTheExtentAlongTheThinnestAxisWhicheverWayItStands) {
+  // A box of 3 x 2 x 0.1 in random orientations: its principal axes are its edges.
+  std::mt19937_64 rng(20023);
+  const auto uniform = [&rng] { return static_cast<double>(rng() >> 11) * 0x1.0p-52 - 1.0; };
+  for (int trial = 0; trial < 50; ++trial) {
+    lattice::Points box(8, 3);
+    for (int i = 0; i < 8; ++i) box.row(i) << 3.0 * (i & 1), 2.0 * ((i >> 1) & 1), 0.1 * ((i >> 2) & 1);
+    const Eigen::Quaterniond q = Eigen::Quaterniond(uniform(), uniform(), uniform(), uniform()).normalized();
+    const lattice::Points turned = box * q.toRotationMatrix();
+    EXPECT_NEAR(thickness(turned), 0.1, 1e-12);  // an eigenvector good to 1e-15 over 4 m
+    box.col(2).setZero();
+    EXPECT_LT(thickness(box * q.toRotationMatrix()), 1e-12);
+  }
+}
+
+TEST(LatticeInput, RefusesAFlatSkin) {
+  try {
+    lattice_input(small_rig());
+    FAIL() << "accepted";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("small.glb: skin: is flat and holds no flesh, got a thickness of"));
+  }
+}
+
 TEST(LatticeInput, HasEveryJointAtItsRestPlace) {
-  const LatticeInput input = lattice_input(small_rig());
+  const LatticeInput input = lattice_input(solid_rig());
   EXPECT_EQ(input.joints.names, (std::vector<std::string>{"root", "tip"}));
   EXPECT_EQ(input.joints.parents, (std::vector<int>{-1, 0}));
   EXPECT_EQ(input.joints.positions.row(1), Eigen::RowVector3d(1, 0, 0));
