@@ -34,7 +34,7 @@ class Scripts(unittest.TestCase):
         self.program("apt-cache", "echo '  Candidate: 1.0'")
         # The built command, as the recorded cmake builds nothing.
         os.makedirs(os.path.join(self.root, "build/release/tools"))
-        self.program("sinew", 'mkdir -p out/hopper; touch out/hopper/preview.png',
+        self.program("sinew", '[[ -d out ]] && mkdir -p out/hopper && touch out/hopper/preview.png',
                      os.path.join(self.root, "build/release/tools"))
 
     def program(self, name, body, folder=None):
