@@ -152,10 +152,8 @@ TEST(Importer, ThatHangsIsEndedInTime) {
   }
 }
 
+#if !defined(__SANITIZE_ADDRESS__)  // which needs terabytes of address space itself
 TEST(Importer, WithoutMemoryIsALimitNotACrash) {
-#if defined(__SANITIZE_ADDRESS__)
-  GTEST_SKIP() << "no memory limit under AddressSanitizer";
-#else
   // 96 MB of positions, read as bytes, as JSON's buffer and as doubles, do not fit into 256 MB of address
   // space.
   TinyGltf gltf;
@@ -171,8 +169,8 @@ TEST(Importer, WithoutMemoryIsALimitNotACrash) {
   } catch (const LimitError& e) {
     EXPECT_EQ(std::string(e.what()), file + ": importer: memory used up; hint: export a smaller scene");
   }
-#endif
 }
+#endif
 
 TEST(Importer, ThatAnswersNonsenseIsNotBelieved) {
   const std::string file = write_file("tiny.fbx", "x");

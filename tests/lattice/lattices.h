@@ -62,7 +62,8 @@ inline lattice::Points points_inside(const lattice::LeafMesh& mesh, int count, s
     Eigen::Vector3d xi = uniform_point(rng, 0.0, 1.0);
     if (i % 3 == 0) xi[static_cast<Eigen::Index>(rng() % 3)] = static_cast<double>(rng() % 2);
     if (i % 6 == 0) xi[static_cast<Eigen::Index>(rng() % 3)] = static_cast<double>(rng() % 2);
-    points.row(i) = lattice::trilinear_weights(xi).transpose() * lattice::hex_corners(mesh.points, mesh.cells[cell]);
+    points.row(i) =
+        lattice::trilinear_weights(xi).transpose() * lattice::hex_corners(mesh.points, mesh.cells[cell]);
   }
   return points;
 }
