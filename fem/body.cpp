@@ -85,6 +85,26 @@ void rescue_bones(const lattice::ControlLattice& lattice, std::vector<std::uint8
   }
 }
 
+/// Everything below indexes weights by skin vertex and frames by joint.
+void check_input(const BodyInput& input) {
+  const auto num_joints = static_cast<double>(input.skeleton.num_joints());
+  const auto& weights = input.skin.weights;
+  require(input.skin.points.rows() == static_cast<Eigen::Index>(weights.size()), "skin weights",
+          static_cast<double>(weights.size()),
+          "one list per vertex, " + std::to_string(input.skin.points.rows()));
+  for (const auto& influences : weights) {
+    for (const lattice::Influence& i : influences) {
+      require(i.frame >= 0 && i.frame < num_joints, "skin weight's joint", i.frame,
+              "0 to " + std::to_string(input.skeleton.num_joints() - 1));
+    }
+  }
+  for (const auto& pose : input.poses) {
+    require(static_cast<int>(pose.size()) == input.skeleton.num_joints(), "pose",
+            static_cast<double>(pose.size()),
+            "one transform per joint, " + std::to_string(input.skeleton.num_joints()));
+  }
+}
+
 }  // namespace
 
 void BodyOptions::validate() const {
@@ -99,6 +119,7 @@ void BodyOptions::validate() const {
 
 Body make_body(const BodyInput& input, const BodyOptions& options) {
   options.validate();
+  check_input(input);
   const double h = input.lattice.edge_length;
   lattice::Hierarchy hierarchy(input.lattice.complex, std::max(1, options.levels));
   const lattice::ActiveSet active =

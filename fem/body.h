@@ -63,7 +63,8 @@ struct BodyInput {
   const std::vector<std::vector<Eigen::Affine3d>>& poses;
 };
 
-/// Throws std::invalid_argument where a cell is inverted, no cell holds flesh, or an option is out of range.
+/// Throws std::invalid_argument where a cell is inverted, no cell holds flesh, the skin has no weights or
+/// names a joint that is not there, or an option is out of range.
 Body make_body(const BodyInput& input, const BodyOptions& options = {});
 
 /// E that makes flesh swing at about 8 Hz and sag by about 6 % of its thickness t (DESIGN section 4):

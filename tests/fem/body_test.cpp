@@ -242,6 +242,31 @@ TEST(MakeBody, NamesTheOptionAtFault) {
   EXPECT_EQ(message([](BodyOptions& o) { o.damping.ratio = -0.1; }), "damping: got -0.100000, expected >= 0");
 }
 
+TEST(MakeBody, RefusesASkinWithoutItsWeights) {
+  const tests::Arm good = tests::make_arm();
+  const auto message = [](const tests::Arm& arm,
+                          std::vector<std::vector<Eigen::Affine3d>> poses) -> std::string {
+    try {
+      make_body({arm.lattice, arm.skin, arm.skeleton, poses});
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message(good, {tests::arm_pose(0.0)}), "");
+  tests::Arm arm = good;
+  arm.skin.weights.clear();
+  EXPECT_THAT(message(arm, {tests::arm_pose(0.0)}),
+              testing::HasSubstr("skin weights: got 0.000000, expected one list per vertex, "));
+  arm = good;
+  arm.skin.weights[7][0].frame = 3;
+  EXPECT_EQ(message(arm, {tests::arm_pose(0.0)}), "skin weight's joint: got 3.000000, expected 0 to 2");
+  EXPECT_EQ(message(good, {{}}), "pose: got 0.000000, expected one transform per joint, 3");
+  arm = good;
+  for (auto& bone : arm.lattice.bones) bone.frame = 9;
+  EXPECT_EQ(message(arm, {tests::arm_pose(0.0)}), "lattice bone names joint 9, expected 0 to 2");
+}
+
 // t = 0.1 m: mu = max(16 * 1000 * 64 * 0.01, 1000 * 9.81 * 0.1 / 0.12) = max(10240, 8175) Pa; E = 2 * 1.45 *
 // mu. t = 0.01 m: max(102.4, 817.5).
 TEST(DefaultYoung, SwingsOrSagsByTheRule) {
