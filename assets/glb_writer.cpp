@@ -98,6 +98,9 @@ void add_weights(const GlbPrimitive& primitive, const std::string& mesh, Buffer&
     if (influences.empty() || influences.size() > kMaxInfluences)
       throw std::invalid_argument("mesh '" + mesh + "': vertex " + std::to_string(v) + " has " +
                                   std::to_string(influences.size()) + " influences, expected 1 to 4");
+    if (!std::all_of(influences.begin(), influences.end(), [](const auto& i) { return i.weight > 0.0; }))
+      throw std::invalid_argument("mesh '" + mesh + "': vertex " + std::to_string(v) +
+                                  " has a weight that is not positive");
     const auto shares = quantise(influences);
     for (std::size_t k = 0; k < kMaxInfluences; ++k) {
       // An unused slot names joint 0: glTF asks for a valid index even where the weight is 0.
