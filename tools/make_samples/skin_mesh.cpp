@@ -155,7 +155,7 @@ lattice::Triangles split(const QuadNet& net, const lattice::Points& points) {
     for (std::size_t c = 0; c < 4; ++c) edges.insert(std::minmax({quad[c], quad[(c + 1) % 4]}));
   lattice::Triangles triangles(2 * static_cast<Eigen::Index>(net.quads.size()), 3);
   for (std::size_t q = 0; q < net.quads.size(); ++q) {
-    const auto [a, b, c, d] = net.quads[q];
+    const int a = net.quads[q][0], b = net.quads[q][1], c = net.quads[q][2], d = net.quads[q][3];
     bool diagonal_ac =
         (points.row(a) - points.row(c)).squaredNorm() <= (points.row(b) - points.row(d)).squaredNorm();
     const auto diagonal = [&] { return diagonal_ac ? std::minmax({a, c}) : std::minmax({b, d}); };
