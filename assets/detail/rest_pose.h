@@ -23,9 +23,11 @@ struct RestPose {
 /// `scene` has normalised weights. Method: with W_j the node pose and B_kj the inverse bind matrix of joint j
 /// in skin k, T_kj = W_j B_kj would be the same map A_k for all j if the file stood in its bind pose. Where
 /// it does, A_k is that map. Where the nodes hold another pose (the first frame of a take, say), A_k is the
-/// similarity with the median scale of the T_kj and their mean rotation snapped to the nearest turn of axes.
-/// Rest joints are R_j = A_k inv(B_kj), so skinning the rest pose reproduces the mesh by construction within
-/// one skin; skins that share joints are aligned through them, and check_rest_pose() sees whether they agree.
+/// similarity with the median scale of the T_kj and their mean rotation snapped to the nearest turn of axes;
+/// or the place of binding, where the file tells it (FBX) and it agrees with that in size and rough
+/// direction. Rest joints are R_j = A_k inv(B_kj), so skinning the rest pose reproduces the mesh by
+/// construction within one skin; skins that share joints are aligned through them, and check_rest_pose() sees
+/// whether they agree.
 RestPose find_rest_pose(const ImportedScene& scene);
 
 /// Skins every mesh at rest with the file's own bind matrices and compares it with its rest points. Throws
