@@ -1,3 +1,5 @@
+// Long, as the systems of the regions, their matrices and the step on them share one private layout.
+
 #include "fem/blended_solver.h"
 
 #include <algorithm>

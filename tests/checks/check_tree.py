@@ -169,9 +169,10 @@ def check_sizes(root):
         if name.startswith("assets/samples/"):
             samples += size
         if name.endswith((".h", ".cpp")):
-            lines = read(root, name).count("\n")
-            if lines > MAX_LINES:
-                yield f"{name}: {lines} lines, expected at most {MAX_LINES}: is it one thing?"
+            text = read(root, name)
+            lines = text.count("\n")
+            if lines > MAX_LINES and not text.startswith("// Long, as "):
+                yield f"{name}: {lines} lines, expected at most {MAX_LINES}, or '// Long, as ...' on the first line"
     if samples > MAX_SAMPLE_BYTES:
         yield f"assets/samples: {samples} bytes in all, expected at most {MAX_SAMPLE_BYTES}"
 
