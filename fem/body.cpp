@@ -199,16 +199,4 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   return body;
 }
 
-double default_young(double thickness, double density, double poisson, double gravity) {
-  constexpr double kSwing = 8.0;  // f [Hz]
-  const double mu = std::max(16.0 * density * kSwing * kSwing * thickness * thickness,
-                             density * gravity * thickness / 0.12);
-  return 2.0 * (1.0 + poisson) * mu;
-}
-
-double limb_thickness(const lattice::ControlLattice& lattice, const lattice::Surface& skin,
-                      const skeleton::Skeleton& skeleton) {
-  return LimbRadii(lattice, frame_tree(lattice, skeleton), skin, lattice.edge_length).typical();
-}
-
 }  // namespace sinew::fem

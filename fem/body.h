@@ -67,12 +67,4 @@ struct BodyInput {
 /// names a joint that is not there, or an option is out of range.
 Body make_body(const BodyInput& input, const BodyOptions& options = {});
 
-/// E that makes flesh swing at about 8 Hz and sag by about 6 % of its thickness t (DESIGN section 4):
-/// mu = max(16 rho f^2 t^2, rho g t / 0.12), E = 2 (1 + nu) mu [Pa].
-double default_young(double thickness, double density, double poisson, double gravity);
-
-/// Thickness t [m] for default_young: the median limb radius of the lattice's bones.
-double limb_thickness(const lattice::ControlLattice& lattice, const lattice::Surface& skin,
-                      const skeleton::Skeleton& skeleton);
-
 }  // namespace sinew::fem

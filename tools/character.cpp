@@ -8,6 +8,7 @@
 
 #include "assets/error.h"
 #include "assets/lattice_files.h"
+#include "fem/default_material.h"
 #include "tools/failure.h"
 
 namespace sinew::tools {
@@ -40,25 +41,50 @@ void report_lattice(const Scene& scene, const lattice::BuildResult& result, cons
   }
 }
 
-/// The scene's materials per bone as materials per joint.
-std::vector<fem::JointMaterial> joint_materials(const Scene& scene, const lattice::ControlLattice& lattice,
-                                                const fem::Material& base) {
+/// Poses of the whole clip, `spacing` apart; enough to see every bend of a clip keyed at 24 to 60 Hz.
+constexpr double kPoseSpacing = 1.0 / 30.0;
+std::vector<std::vector<Eigen::Affine3d>> sample_poses(const Character& c) {
+  std::vector<std::vector<Eigen::Affine3d>> poses;
+  const double duration = std::min(c.the_clip().duration(), 3600.0);  // an hour shows what a clip does
+  for (int k = 0; k * kPoseSpacing < duration; ++k)
+    poses.push_back(c.pose(c.the_clip().start + k * kPoseSpacing));
+  poses.push_back(c.pose(c.the_clip().end));
+  return poses;
+}
+
+/// The scene's materials: E by the scene or by default, then what the scene says of single bones.
+void settle_materials(const Scene& scene, Character& c) {
+  fem::BodyOptions& body = c.body_options;
+  const lattice::ControlLattice& lattice = c.lattice.lattice;
+  // The sag rule speaks of the gravity that the flesh is built for: the Earth's where the scene has none.
+  constexpr double kEarth = 9.81;
+  const std::vector<std::vector<Eigen::Affine3d>> poses = sample_poses(c);
+  const fem::DefaultMaterials defaults = fem::default_materials(
+      {lattice, c.input.skin.surface, c.rig.skeleton, poses, kPoseSpacing, scene.density, scene.poisson,
+       scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth});
+  c.limb_thickness = defaults.thickness;
+  body.material = defaults.base;
+  if (scene.young) {
+    body.material.young = *scene.young;
+  } else {
+    body.materials = defaults.of_joints;
+  }
   std::vector<std::string> names;
   for (const auto& bone : lattice.bones) names.push_back(bone.name);
   const std::vector<int> chosen = material_of_bone(scene, scene.rig, names);
-  std::vector<fem::JointMaterial> materials;
   for (std::size_t b = 0; b < lattice.bones.size(); ++b) {
     if (chosen[b] < 0) continue;
+    const int joint = lattice.bones[b].frame;
+    fem::Material material = body.material;
+    for (const auto& of_joint : body.materials) {
+      if (of_joint.joint == joint) material = of_joint.material;  // the last one counts
+    }
     const BoneMaterial& m = scene.materials[static_cast<std::size_t>(chosen[b])];
-    fem::Material material = base;
-    // A material that names another nu keeps the base's shear modulus only if it names no E; E is what the
-    // user sees.
     if (m.young) material.young = *m.young;
     if (m.poisson) material.poisson = *m.poisson;
     if (m.density) material.density = *m.density;
-    materials.push_back({lattice.bones[b].frame, material});
+    body.materials.push_back({joint, material});
   }
-  return materials;
 }
 
 }  // namespace
@@ -99,23 +125,12 @@ Character make_character(const Scene& scene, const Talk& talk) {
   body.material.poisson = scene.poisson;
   body.material.density = scene.density;
   body.damping = {scene.damping, scene.damping_frequency};
-  c.limb_thickness = fem::limb_thickness(c.lattice.lattice, c.input.skin.surface, c.rig.skeleton);
-  // The sag rule speaks of the gravity that the flesh is built for: the Earth's where the scene has none.
-  constexpr double kEarth = 9.81;
-  const double gravity = scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth;
-  body.material.young = scene.young
-                            ? *scene.young
-                            : fem::default_young(c.limb_thickness, scene.density, scene.poisson, gravity);
-  body.materials = joint_materials(scene, c.lattice.lattice, body.material);
+  settle_materials(scene, c);
   return c;
 }
 
 fem::Body make_body(const Character& character) {
-  const skeleton::Clip& clip = character.the_clip();
-  std::vector<std::vector<Eigen::Affine3d>> poses;
-  constexpr double kEvery = 1.0 / 30.0;  // fine enough to see every bend of a clip keyed at 24 to 60 Hz
-  const int count = static_cast<int>(std::min(clip.duration() / kEvery, 1e5)) + 1;
-  for (int k = 0; k <= count; ++k) poses.push_back(character.pose(clip.start + clip.duration() * k / count));
+  const std::vector<std::vector<Eigen::Affine3d>> poses = sample_poses(character);
   try {
     return fem::make_body(
         {character.lattice.lattice, character.input.skin.surface, character.rig.skeleton, poses},

@@ -147,11 +147,13 @@ void say_what_runs(const Scene& scene, const Character& c, const FrameRange& fra
     if (&other != &clip) others += (others.empty() ? "" : ", ") + other.name;
   }
   if (scene.clip.empty() && !others.empty()) talk("other clips: " + others);
+  double stiffest = c.body_options.material.young;
+  for (const auto& of_joint : c.body_options.materials) stiffest = std::max(stiffest, of_joint.material.young);
   talk(fmt::format(
-      "lattice: {} cells, {} vertices, {} bones; flesh: E {:.3g} Pa, nu {:g}, rho {:g} kg/m^3, damping {:g} "
+      "lattice: {} cells, {} vertices, {} bones; flesh: E {:.3g} to {:.3g} Pa, nu {:g}, rho {:g} kg/m^3, damping {:g} "
       "at {:g} Hz",
       l.complex.cells.size(), l.complex.points.rows(), l.bones.size(), c.body_options.material.young,
-      scene.poisson, scene.density, scene.damping, scene.damping_frequency));
+      stiffest, scene.poisson, scene.density, scene.damping, scene.damping_frequency));
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {

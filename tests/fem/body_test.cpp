@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "fem/default_material.h"
 #include "tests/fem/arm.h"
 #include "tests/lattice/shapes.h"
 
@@ -268,10 +269,11 @@ TEST(MakeBody, RefusesASkinWithoutItsWeights) {
 }
 
 // t = 0.1 m: mu = max(16 * 1000 * 64 * 0.01, 1000 * 9.81 * 0.1 / 0.12) = max(10240, 8175) Pa; E = 2 * 1.45 *
-// mu. t = 0.01 m: max(102.4, 817.5).
+// mu. t = 0.01 m: max(102.4, 817.5). With bones thrown about at 100 m/s^2: 2 * 1000 * 100 * 0.1 = 20000.
 TEST(DefaultYoung, SwingsOrSagsByTheRule) {
-  EXPECT_NEAR(default_young(0.1, 1000.0, 0.45, 9.81), 2.9 * 10240.0, 1e-8);
-  EXPECT_NEAR(default_young(0.01, 1000.0, 0.45, 9.81), 2.9 * 817.5, 1e-9);
+  EXPECT_NEAR(default_young(0.1, 1000.0, 0.45, 9.81, 100.0), 2.9 * 20000.0, 1e-8);
+  EXPECT_NEAR(default_young(0.1, 1000.0, 0.45, 9.81, 0.0), 2.9 * 10240.0, 1e-8);
+  EXPECT_NEAR(default_young(0.01, 1000.0, 0.45, 9.81, 0.0), 2.9 * 817.5, 1e-9);
 }
 
 TEST(Damping, HasItsRatioAtItsFrequency) {
