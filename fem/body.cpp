@@ -1,6 +1,7 @@
 #include "fem/body.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -131,6 +132,10 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   const lattice::SurfaceQuery query(input.skin.points, input.skin.triangles);
   lattice::Embedding skin = lattice::embed(mesh, input.skin.points);
   std::vector<lattice::FillFractions> fill = lattice::fill_fractions(mesh, query, options.shell * h);
+  // A quarter of a level-1 cell: no octant that the skin crosses for more than a corner is overlooked.
+  const double spacing = 0.125 * h * std::exp2(1 - std::max(1, options.levels));
+  lattice::fill_grazed_octants(
+      mesh, lattice::sample_triangles(input.skin.points, input.skin.triangles, spacing), fill);
   std::vector<std::uint8_t> keep = lattice::filled_cells(fill, skin.cell);
   // A coarse cell stays or goes as a whole: were only some of its children kept, a level-0 hat could reach
   // kept cells without having its own vertex there, and it would be a combination of details.

@@ -1,6 +1,9 @@
 #include "lattice/fill.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "lattice/embedding.h"
 
 namespace sinew::lattice {
 namespace {
@@ -37,6 +40,37 @@ std::vector<FillFractions> fill_fractions(const LeafMesh& mesh, const SurfaceQue
     }
   }
   return fill;
+}
+
+Points sample_triangles(const Points& points, const Triangles& triangles, double spacing) {
+  std::vector<double> samples;
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
+    const Eigen::RowVector3d a = points.row(triangles(t, 0));
+    const Eigen::RowVector3d ab = points.row(triangles(t, 1)) - a, ac = points.row(triangles(t, 2)) - a;
+    const double longest = std::max({ab.norm(), ac.norm(), (ab - ac).norm()});
+    const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
+    for (int i = 0; i <= n; ++i) {
+      for (int j = 0; i + j <= n; ++j) {
+        const Eigen::RowVector3d p = a + (ab * i + ac * j) / n;
+        samples.insert(samples.end(), p.data(), p.data() + 3);
+      }
+    }
+  }
+  return Eigen::Map<const Points>(samples.data(), static_cast<Eigen::Index>(samples.size() / 3), 3);
+}
+
+void fill_grazed_octants(const LeafMesh& mesh, const Points& samples, std::vector<FillFractions>& fill) {
+  const Embedding embedding = embed(mesh, samples);
+  for (std::size_t i = 0; i < embedding.cell.size(); ++i) {
+    const Eigen::RowVector3d xi = embedding.xi.row(static_cast<Eigen::Index>(i));
+    for (std::size_t k = 0; k < 8; ++k) {
+      bool here = true;
+      for (int c = 0; c < 3; ++c)
+        here = here && (xi[c] > 0.5) == (kCorners[k][static_cast<std::size_t>(c)] == 1);
+      double& share = fill[static_cast<std::size_t>(embedding.cell[i])][k];
+      if (here) share = std::max(share, kGrazedFill);
+    }
+  }
 }
 
 std::vector<std::uint8_t> filled_cells(const std::vector<FillFractions>& fill,

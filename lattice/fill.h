@@ -17,6 +17,17 @@ using FillFractions = std::array<double, 8>;
 /// or it lies within `shell` [m] of the surface (open sheets have no inside). One entry per leaf cell.
 std::vector<FillFractions> fill_fractions(const LeafMesh& mesh, const SurfaceQuery& skin, double shell);
 
+/// Points on every triangle, no farther than `spacing` [m] from their neighbours; corners included.
+Points sample_triangles(const Points& points, const Triangles& triangles, double spacing);
+
+/// What an octant holds at least if the skin passes through it: half of one sample's share, the mean of what
+/// eight samples overlook. Without it a thin part (an ear, a fin) between samples would hang on next to
+/// nothing.
+inline constexpr double kGrazedFill = 1.0 / 16.0;
+
+/// Raises the fill of every octant that holds one of the `samples` of the skin to kGrazedFill.
+void fill_grazed_octants(const LeafMesh& mesh, const Points& samples, std::vector<FillFractions>& fill);
+
 /// Flags the leaf cells that stay: any fill, or a point embedded in it (`embedded_cells`: cell indices, e.g.
 /// Embedding::cell).
 std::vector<std::uint8_t> filled_cells(const std::vector<FillFractions>& fill,
