@@ -51,7 +51,9 @@ class Simulation {
   /// it the motion's velocity, so that nothing jolts at the first frame. Same step and matrices as the run.
   [[nodiscard]] SimulationReport settle();
 
-  /// Steps until state().time >= time; does nothing when it is there already.
+  /// Steps, or sub-steps where a frame turns fast, until state().time >= time; does nothing when it is there
+  /// already. Throws std::invalid_argument naming joint and time where the motion gives a frame that is not
+  /// finite or has no volume; the state stays the last good one.
   [[nodiscard]] SimulationReport advance_to(double time);
 
   const State& state() const { return state_; }
