@@ -10,68 +10,14 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "fem/detail/coordinates.h"
+
 namespace sinew::fem {
 namespace {
 
 using lattice::Points;
+using detail::Coordinates;
 using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
-
-/// The functions in which systems are written, over all leaf vertices.
-struct Coordinates {
-  RowSparse values;         ///< leaf vertices x functions.
-  std::vector<int> vertex;  ///< leaf vertex of a function.
-  std::vector<std::uint8_t>
-      is_value;  ///< the coefficient is a position (moves with translation), not a detail.
-  std::vector<std::uint8_t> is_known;      ///< on a bone.
-  std::vector<int> parent_start, parents;  ///< of details: leaf vertices whose mean is subtracted.
-
-  int num_functions() const { return static_cast<int>(vertex.size()); }
-
-  /// Coefficients of the functions from vertex values.
-  void analyse(const Points& from, Points& to) const {
-    to.resize(num_functions(), 3);
-    for (int f = 0; f < num_functions(); ++f) {
-      const auto i = static_cast<std::size_t>(f);
-      Eigen::RowVector3d value = from.row(vertex[i]);
-      const int begin = parent_start[i], end = parent_start[i + 1];
-      if (begin < end) {
-        Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
-        for (int p = begin; p < end; ++p) mean += from.row(parents[static_cast<std::size_t>(p)]);
-        value -= mean / static_cast<double>(end - begin);
-      }
-      to.row(f) = value;
-    }
-  }
-};
-
-Coordinates hierarchical_coordinates(const Body& body) {
-  Coordinates c;
-  c.values = body.mesh.values_from_coefficients;
-  c.parent_start.push_back(0);
-  for (int v : body.mesh.functions) {
-    const int leaf = body.mesh.leaf_of_vertex[static_cast<std::size_t>(v)];
-    c.vertex.push_back(leaf);
-    for (int p : body.hierarchy.parents(v))
-      c.parents.push_back(body.mesh.leaf_of_vertex[static_cast<std::size_t>(p)]);
-    c.parent_start.push_back(static_cast<int>(c.parents.size()));
-    c.is_value.push_back(body.hierarchy.level(v) == 0);
-    c.is_known.push_back(body.bones.is_bone[static_cast<std::size_t>(leaf)]);
-  }
-  return c;
-}
-
-/// Hats of the leaf vertices; right only where every leaf vertex but those on bones is active.
-Coordinates nodal_coordinates(const Body& body) {
-  Coordinates c;
-  const int n = body.mesh.num_vertices();
-  c.values.resize(n, n);
-  c.values.setIdentity();
-  c.parent_start.assign(static_cast<std::size_t>(n) + 1, 0);
-  c.is_value.assign(static_cast<std::size_t>(n), 1);
-  c.is_known = body.bones.is_bone;
-  for (int a = 0; a < n; ++a) c.vertex.push_back(a);
-  return c;
-}
 
 /// Four lanes, of which three are used: the processor then works on pairs.
 using Lanes = Eigen::Vector4d;
@@ -288,7 +234,7 @@ BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
   impl_->body = &body;
   impl_->options = options;
   impl_->coordinates =
-      options.basis == Basis::Nodal ? nodal_coordinates(body) : hierarchical_coordinates(body);
+      options.basis == Basis::Nodal ? detail::nodal_coordinates(body) : detail::hierarchical_coordinates(body);
   impl_->build_systems();
 }
 BlendedSolver::~BlendedSolver() = default;

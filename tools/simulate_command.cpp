@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <chrono>
-#include <fstream>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -148,9 +148,11 @@ void say_what_runs(const Scene& scene, const Character& c, const FrameRange& fra
   }
   if (scene.clip.empty() && !others.empty()) talk("other clips: " + others);
   double stiffest = c.body_options.material.young;
-  for (const auto& of_joint : c.body_options.materials) stiffest = std::max(stiffest, of_joint.material.young);
+  for (const auto& of_joint : c.body_options.materials)
+    stiffest = std::max(stiffest, of_joint.material.young);
   talk(fmt::format(
-      "lattice: {} cells, {} vertices, {} bones; flesh: E {:.3g} to {:.3g} Pa, nu {:g}, rho {:g} kg/m^3, damping {:g} "
+      "lattice: {} cells, {} vertices, {} bones; flesh: E {:.3g} to {:.3g} Pa, nu {:g}, rho {:g} kg/m^3, "
+      "damping {:g} "
       "at {:g} Hz",
       l.complex.cells.size(), l.complex.points.rows(), l.bones.size(), c.body_options.material.young,
       stiffest, scene.poisson, scene.density, scene.damping, scene.damping_frequency));
@@ -271,7 +273,9 @@ void simulate(const Scene& scene) {
       run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
   lap("simulate and write frames");
   assets::PreviewOptions picture;
-  picture.caption = character.the_clip().name;
+  picture.caption =
+      std::filesystem::path(character.rig.file).stem().string() + ", " + character.the_clip().name;
+  picture.colours = assets::role_colours(character.rig);
   assets::write_preview(out.file("preview.png"), all_triangles(character.rig), preview, picture);
   lap("preview");
   report.counts = simulation.counts();

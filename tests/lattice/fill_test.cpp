@@ -89,6 +89,43 @@ TEST(FillFractions, GiveAnOpenSheetTheThicknessOfItsShell) {
   EXPECT_DOUBLE_EQ(filled_volume(mesh, fill_fractions(mesh, query, 0.2)), 4.0 * 0.5);
 }
 
+TEST(SampleTriangles, LeavesNoPointOfATriangleFartherThanTheSpacing) {
+  Points points(3, 3);
+  points << 0, 0, 0, 3, 0, 0, 0, 1, 0.5;
+  Triangles triangles(1, 3);
+  triangles << 0, 1, 2;
+  const Points samples = sample_triangles(points, triangles, 0.1);
+  for (double a = 0.0; a <= 1.0; a += 0.05) {
+    for (double b = 0.0; a + b <= 1.0; b += 0.05) {
+      const Eigen::RowVector3d p = (1 - a - b) * points.row(0) + a * points.row(1) + b * points.row(2);
+      EXPECT_LE((samples.rowwise() - p).rowwise().norm().minCoeff(), 0.1);
+    }
+  }
+}
+
+TEST(GrazedOctants, AreThoseThatHoldASampleOfTheSkin) {
+  const Hierarchy hierarchy(box_lattice({{0, 0, 0}, {2, 2, 2}, {1, 1, 1}, CellType::Hexahedron, {}}), 1);
+  const LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);  // eight cells of size 1
+  Points sample(1, 3);
+  sample << 0.25, 0.75, 1.25;
+  std::vector<FillFractions> fill(mesh.cells.size(), FillFractions{});
+  fill[3].fill(0.5);
+  fill_grazed_octants(mesh, sample, fill);
+  int raised = 0;
+  for (std::size_t c = 0; c < fill.size(); ++c) {
+    for (std::size_t k = 0; k < 8; ++k) {
+      if (c == 3) EXPECT_EQ(fill[c][k], 0.5);
+      if (fill[c][k] != kGrazedFill) continue;
+      ++raised;
+      // The octant's middle: half-way between the cell's middle and its corner k.
+      const HexCorners corners = hex_corners(mesh.points, mesh.cells[c]);
+      const Eigen::RowVector3d middle = 0.5 * (corners.colwise().mean() + corners.row(static_cast<int>(k)));
+      EXPECT_LE((middle - sample.row(0)).cwiseAbs().maxCoeff(), 0.25);
+    }
+  }
+  EXPECT_EQ(raised, 1);
+}
+
 TEST(FilledCells, KeepsCellsWithFleshOrWithAnEmbeddedPoint) {
   std::vector<FillFractions> fill(4, FillFractions{});
   fill[1][5] = 0.125;
