@@ -4,7 +4,7 @@
 
 #include "fem/body.h"
 
-/// Where the flesh deforms: what adaptive refinement will look at ([Capell02, sec. 4.3], DESIGN section 8).
+/// Where the flesh deforms: what adaptive refinement will look at ([Capell02, sec. 4.3]).
 namespace sinew::adapt {
 
 /// Deformation magnitude [-] of every active function, in the order of body.mesh.functions:

@@ -84,7 +84,7 @@ double thickness(const lattice::Points& points);
 inline constexpr double kFlatSkin = 2e-4;
 
 struct LoadOptions {
-  /// Height of the character [m]; 0 = guess the units (DESIGN section 4).
+  /// Height of the character [m]; 0 = guess the units.
   double height = 0.0;
   /// Run third-party importers in this executable (installed beside sinew); empty = the default place.
   std::string importer_executable;

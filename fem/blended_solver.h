@@ -9,7 +9,7 @@
 #include "fem/integrator.h"
 
 /// Blended local linearisation: one prefactored linear system per region, blended by the region weights
-/// ([Capell02, sec. 5], DESIGN section 6).
+/// ([Capell02, sec. 5]).
 namespace sinew::fem {
 
 /// What moves: positions and velocities of the leaf vertices, now and one step earlier.

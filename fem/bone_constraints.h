@@ -5,7 +5,7 @@
 #include "fem/frames.h"
 #include "lattice/basis.h"
 
-/// Lattice vertices on hard bones: known at every instant (DESIGN section 5). The one place where lattice and
+/// Lattice vertices on hard bones: known at every instant. The one place where lattice and
 /// skeleton meet.
 namespace sinew::fem {
 

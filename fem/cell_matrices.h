@@ -14,7 +14,7 @@ namespace sinew::fem {
 using CellStiffness = Eigen::Matrix<double, 24, 24>;  ///< dof 3 * corner + component [N/m].
 using CellMass = Eigen::Matrix<double, 8, 8>;         ///< one value per pair of corners [kg].
 
-/// Share of stiffness and mass kept on the unfilled part of a cell, eps of DESIGN section 4: it changes
+/// Share of stiffness and mass kept on the unfilled part of a cell, eps: it changes
 /// results by less than 0.2 % there and keeps every function's diagonal away from zero.
 inline constexpr double kEmptyShare = 1e-4;
 
@@ -25,7 +25,7 @@ Eigen::Vector3d gauss_point(int k);
 /// rest. A negative entry means an inverted cell.
 std::array<double, 8> gauss_weights(const lattice::HexCorners& corners, const lattice::FillFractions& fill);
 
-/// K of DESIGN section 4:
+/// K with mean dilatation [Hughes80]:
 ///   K_ab = sum_q w_q [ mu (g_a.g_b I + g_b g_a^T) - 2 mu/3 g_a g_b^T + kappa_b G_a G_b^T ],
 /// g_a the gradient of hat a at Gauss point q, G_a its mean over the filled part of the cell ([Hughes80]
 /// B-bar).

@@ -4,7 +4,7 @@
 
 #include "fem/body.h"
 
-/// How stiff flesh is where nobody says so (DESIGN section 4, "Defaults").
+/// How stiff flesh is where nobody says so.
 namespace sinew::fem {
 
 /// E [Pa] of flesh of thickness t [m] that swings at about 8 Hz, sags by about 6 % of its thickness under

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-/// Implicit time integration as one stage (DESIGN section 6):
+/// Implicit time integration as one stage:
 ///   x+ = xh + eta h v+,   M (v+ - vh) = theta h F+,
 ///   A = (1 + theta alpha h) M + theta eta h^2 (1 + beta/(kappa h)) K + theta eta h^2 P.
 namespace sinew::fem {

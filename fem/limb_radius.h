@@ -7,7 +7,7 @@
 
 namespace sinew::fem {
 
-/// How thick the flesh round a bone is (DESIGN section 5, "Limb radius").
+/// How thick the flesh round a bone is.
 class LimbRadii {
  public:
   /// `window` h [m]: skin that projects onto the bone within it of a point counts there.
@@ -20,7 +20,7 @@ class LimbRadii {
   /// Radius [m] near the point at distance `along` [m] from the bone's start, over the skin within the
   /// window; else of_bone.
   double near(int bone, double along) const;
-  /// Median over the bones [m]: t of DESIGN section 4.
+  /// Median over the bones [m]: t of default_young.
   double typical() const;
 
  private:

@@ -6,7 +6,7 @@
 #include "fem/frame_weights.h"
 #include "fem/limb_radius.h"
 
-/// Regions in which the flesh is linearised: one per frame and one (or two) per joint (DESIGN section 6). A
+/// Regions in which the flesh is linearised: one per frame and one (or two) per joint. A
 /// scene pays only for what it models: frames that move as one share a region, and joints that hardly bend
 /// have none.
 namespace sinew::fem {

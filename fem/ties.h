@@ -6,8 +6,8 @@
 #include "fem/leaf_matrices.h"
 #include "fem/limb_radius.h"
 
-/// Penalties that tie flesh to a frame: the twist penalty of hard bones, soft bones and soft frames (DESIGN
-/// section 5).
+/// Penalties that tie flesh to a frame: the twist penalty of hard bones, soft bones and soft frames
+/// ([Capell02, sec. 5.3] for the need; the tube is ours).
 namespace sinew::fem {
 
 /// sum over bones of kappa/2 int_{tube} |p - T_b r(x)|^2 dV, with kappa = c mu / r^2.

@@ -8,7 +8,7 @@
 
 #include "lattice/hierarchy.h"
 
-/// The active set and the cells on which it is integrated (DESIGN sections 3 and 4).
+/// The active set and the cells on which it is integrated.
 namespace sinew::lattice {
 
 /// Which basis functions are active: one flag per vertex of the hierarchy. A plain value; may change at any

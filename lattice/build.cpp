@@ -27,7 +27,7 @@ using namespace detail;
 constexpr int kSearchSteps = 8;
 constexpr double kCloseEnough = 0.05;
 
-/// What one attempt is made with (LATTICE step 11).
+/// What one attempt is made with.
 struct Attempt {
   double h_factor = 1.0;
   ReductionOptions reduction;
@@ -63,9 +63,22 @@ Draft make_draft(const RigInput& input, double h, const Attempt& attempt, const 
   return draft;
 }
 
+/// The h below which the grid over the skin's box has a hundred points per wanted cell: no body fills so
+/// little of its box, but a sheet of a few triangles may never give the wanted number, and the search must
+/// end.
+double smallest_edge_length(const RigInput& input, int wanted) {
+  const Points& points = input.unit_skin.points;
+  const Eigen::RowVector3d box = points.colwise().maxCoeff() - points.colwise().minCoeff();
+  double h = 0.5;
+  const auto grid_points = [&] { return (box.array() + 2.4 * h).prod() / (h * h * h); };
+  while (grid_points() < 100.0 * wanted) h *= 0.9;
+  return h;
+}
+
 /// Secant search, in logarithms, for the h that gives the wanted number of cells.
 double find_edge_length(const RigInput& input, int wanted) {
   const double target = std::log(static_cast<double>(wanted));
+  const double lowest = std::log(smallest_edge_length(input, wanted));
   double x = std::log(0.1), best_x = x, best_error = std::numeric_limits<double>::infinity();
   double old_x = 0.0, old_y = 0.0, slope = -2.3;  // cells go like h^-3 in a bulk, h^-2 in a skin
   for (int step = 0; step < kSearchSteps; ++step) {
@@ -77,7 +90,7 @@ double find_edge_length(const RigInput& input, int wanted) {
     if (step > 0 && std::abs(x - old_x) > 1e-9) slope = std::clamp((y - old_y) / (x - old_x), -4.0, -1.2);
     old_x = x;
     old_y = y;
-    x += std::clamp((target - y) / slope, -1.2, 1.2);
+    x = std::max(x + std::clamp((target - y) / slope, -1.2, 1.2), lowest);
   }
   return std::exp(best_x);
 }

@@ -8,13 +8,13 @@
 
 namespace sinew::lattice {
 
-/// Controls of the lattice builder (LATTICE steps 1-11).
+/// Controls of the lattice builder.
 struct BuildOptions {
   /// Wanted number of cells [-]; >= 20. The secant search on h lands within about 10 %.
   int cells = 1000;
   /// Retries after a failed gate; 0 = one attempt only.
   int max_retries = 6;
-  /// Gate thresholds (LATTICE step 10).
+  /// Gate thresholds.
   double min_dihedral_degrees = 8.0;
   double min_scaled_jacobian = 0.08;
 

@@ -9,7 +9,7 @@
 #include "lattice/points.h"
 
 /// The control lattice: a coarse complex of convex cells round the skin in which every hard bone is a chain
-/// of edges ([Capell02, sec. 4.1], DESIGN section 3).
+/// of edges ([Capell02, sec. 4.1]).
 namespace sinew::lattice {
 
 /// Shapes in which every vertex has valence 3, so that one subdivision gives one hexahedron per corner.
@@ -37,7 +37,7 @@ struct CellComplex {
 };
 
 /// A rest point whose posed position is (1-s) T_a X_a + s T_b X_b, with T the joint's affine map from rest to
-/// now (DESIGN section 2). A vertex on a tip bone has joint_a == joint_b.
+/// now. A vertex on a tip bone has joint_a == joint_b.
 struct BoneAnchor {
   int joint_a = -1;              ///< joint index of the rig.
   int joint_b = -1;              ///< joint index of the rig.
@@ -76,7 +76,7 @@ struct SkeletonChange {
   std::string reason;  ///< one sentence with the numbers that decided.
 };
 
-/// Quality of a lattice against its skin (LATTICE step 10).
+/// Quality of a lattice against its skin.
 struct LatticeQuality {
   double min_dihedral_degrees = 0.0;
   /// Smallest scaled Jacobian of the level-1 hexahedra (a regular tetrahedron gives 0.707).

@@ -6,7 +6,7 @@
 #include "lattice/basis.h"
 #include "lattice/surface_query.h"
 
-/// How much of each leaf cell is flesh (DESIGN section 4, "Fill").
+/// How much of each leaf cell is flesh.
 namespace sinew::lattice {
 
 /// Share of material round each of the 2x2x2 Gauss points of a leaf cell, in [0, 1]; Gauss point k belongs to

@@ -8,7 +8,7 @@
 #include "lattice/trilinear.h"
 
 /// Subdivision of the control lattice and the vertices that carry the hierarchical (lazy wavelet) basis
-/// ([Capell02, sec. 4.2], DESIGN section 3).
+/// ([Capell02, sec. 4.2]).
 namespace sinew::lattice {
 
 /// The lattice subdivided `num_levels` times. Vertices keep their index for ever: those of level 0 come

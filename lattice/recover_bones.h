@@ -11,7 +11,7 @@ namespace sinew::lattice {
 inline constexpr double kRecoverTolerance = 1e-5;
 
 /// Makes a control lattice of cells that somebody else built: reduces the skeleton at the cells' mean edge
-/// length (LATTICE step 4) and takes for every bone the chain of edges that lies on it. A bone without such a
+/// length and takes for every bone the chain of edges that lies on it. A bone without such a
 /// chain becomes soft; `changes` says so. The quality is measured. Throws std::invalid_argument where the
 /// skin, the joints or the cells cannot be used.
 ControlLattice recover_bones(const CellComplex& complex, const Surface& skin, const JointTree& joints);

@@ -19,7 +19,7 @@ struct LocalTransform {
 };
 
 /// One joint: a frame in a tree. Control joints, helpers and plain nodes are joints too; which of them carry
-/// bones is decided elsewhere (DESIGN section 2).
+/// bones is decided elsewhere.
 struct Joint {
   std::string name;  ///< unique in the skeleton, never empty.
   int parent = -1;   ///< index of the parent, smaller than the joint's own; -1 for a root.

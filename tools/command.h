@@ -8,7 +8,7 @@ namespace sinew::tools {
 
 /// What a subcommand hands back to main.
 struct CommandContext {
-  int exit_code = 0;  ///< of the subcommand that ran (DESIGN section 10).
+  int exit_code = 0;  ///< of the subcommand that ran.
 };
 
 // Each adds one subcommand to `app`; its callback does the work, prints data to stdout and talk to stderr,

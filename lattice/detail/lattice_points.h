@@ -7,7 +7,7 @@
 
 namespace sinew::lattice::detail {
 
-/// The vertices of a lattice to be, unit coordinates (LATTICE step 5).
+/// The vertices of a lattice to be, unit coordinates.
 struct LatticePoints {
   /// Where a vertex may go.
   struct Place {

@@ -4,7 +4,7 @@
 
 namespace sinew::lattice::detail {
 
-/// LATTICE step 8, unit coordinates: raises the quality of the cells by flips and by moving vertices, pulls
+/// Unit coordinates: raises the quality of the cells by flips and by moving vertices, pulls
 /// the boundary to 0.2 h outside the skin, and never lets go of a sample. Joints stay, vertices on bones
 /// slide along them, edges of bones are kept. Moves `points`, replaces `cells`.
 void optimise(LatticePoints& points, Tetrahedra& cells, const ReducedSkeleton& skeleton, const UnitSkin& skin,

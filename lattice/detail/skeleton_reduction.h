@@ -8,7 +8,7 @@
 
 namespace sinew::lattice::detail {
 
-/// Thresholds of LATTICE step 4; lengths in units of h.
+/// Thresholds of the reduction; lengths in units of h.
 struct ReductionOptions {
   double smallest_bone = 0.5;   ///< shorter bones are contracted.
   double cut_distance = 0.25;   ///< a bone farther than this outside the skin may be cut.

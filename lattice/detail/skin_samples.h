@@ -7,7 +7,7 @@
 
 namespace sinew::lattice::detail {
 
-/// What every lattice must hold (LATTICE step 2), unit coordinates: the skin's vertices, the same pushed out
+/// What every lattice must hold, unit coordinates: the skin's vertices, the same pushed out
 /// by 0.03 h, voxel centres inside, and the skin's triangles. All later tests use these, so holes, open
 /// sheets, self-intersections and many parts cannot break the build. Triangles are tested exactly: they may
 /// not cross the boundary of the lattice.

@@ -17,7 +17,7 @@ struct TetrahedraResult {
   int splits = 0;               ///< bone pieces that were split at their midpoint.
 };
 
-/// LATTICE steps 6 and 7: Delaunay tetrahedra of the points [CGAL], bone pieces that are missing split at
+/// Delaunay tetrahedra of the points [CGAL], bone pieces that are missing split at
 /// their midpoints (added to `points`), free points near bones relaxed, then cells without a sample dropped.
 TetrahedraResult tetrahedralise(LatticePoints& points, const ReducedSkeleton& skeleton,
                                 const SkinSamples& samples, double h, const PointOptions& options);

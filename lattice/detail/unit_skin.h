@@ -7,7 +7,7 @@
 
 namespace sinew::lattice::detail {
 
-/// The skin as the builder sees it (LATTICE step 1): centred on its bounding box, longest side of the box 1,
+/// The skin as the builder sees it: centred on its bounding box, longest side of the box 1,
 /// welded, without degenerate and doubled triangles, every component turned outward.
 struct UnitSkin {
   Eigen::Vector3d centre{0, 0, 0};              ///< of the bounding box [m].

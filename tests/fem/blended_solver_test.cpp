@@ -95,7 +95,7 @@ TEST(BlendedSolver, DoesNothingToFleshAtRest) {
   }
 }
 
-// DESIGN section 5: without the twist penalty the flesh is free to turn about a straight bone; with it, 81 to
+// Without the twist penalty the flesh is free to turn about a straight bone; with it, 81 to
 // 87 of 90 degrees are followed at mid-forearm of a round limb. The corners of this square one hang
 // back: 80.3 measured, 59 without the penalty.
 TEST(BlendedSolver, FollowsATwistOfTheForearm) {

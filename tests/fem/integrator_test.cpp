@@ -157,7 +157,7 @@ double amplification(Integrator integrator, double w) {
   return std::abs((2.0 + std::sqrt(4.0 - 2.0 * (1.5 - iw))) / (2.0 * (1.5 - iw)));
 }
 
-// DESIGN section 6: of a whip at 4 Hz, 0.92 is left after five swings at 1/120 s with BDF2, 0.04 with
+// The method's prototype: of a whip at 4 Hz, 0.92 is left after five swings at 1/120 s with BDF2, 0.04 with
 // backward Euler.
 TEST(Integrators, DampAFreeSwingAsTheirClosedFormSays) {
   tests::BarOptions bar;

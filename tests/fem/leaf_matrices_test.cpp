@@ -256,8 +256,8 @@ TEST(PartialFill, ChangesTheSolutionContinuously) {
     EXPECT_NEAR(sag(1.01 * std::min(f, 0.99)), sag(std::min(f, 0.99)), 0.01 * now) << f;
     previous = now;
   }
-  // Vanishing fill gives the bar of the lower layer alone; kEmptyShare adds less than the 0.2 % of DESIGN
-  // section 4.
+  // Vanishing fill gives the bar of the lower layer alone; kEmptyShare adds less than the 0.2 % that a nearly
+  // empty layer may cost.
   tests::BarOptions lower;
   lower.box.max[2] = 0.0;
   const Body body = tests::bar_body(lower);

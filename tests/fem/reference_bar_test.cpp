@@ -41,7 +41,7 @@ Body bar_at(int levels, double poisson, bool clamped = true) {
 
 double percent(double value, double exact) { return 100.0 * (value / exact - 1.0); }
 
-// DESIGN section 4 publishes tip errors of -1.7, -3.2 and -4.0 % for 10 x 2 x 2 active cells; the converged
+// The method's prototype had tip errors of -1.7, -3.2 and -4.0 % for 10 x 2 x 2 active cells; the converged
 // values behind them are those of 40 x 8 x 8 cells of the same kind, below. To its digits.
 TEST(ReferenceBar, SagsByThePublishedShareOfItsConvergedTip) {
   for (const auto& [poisson, published, fine] :

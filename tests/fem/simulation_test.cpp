@@ -155,7 +155,7 @@ TEST(Simulation, AHeldElbowIsAFixedPoint) {
   }
 }
 
-// The blended step is not passive in bent poses, which is why it wants damping (DESIGN section 6: 10 % by
+// The blended step is not passive in bent poses, which is why it wants damping (10 % by
 // default). After a whip to 90 degrees and a stop the motion must die out: the kinetic energy's largest value
 // in each 0.25 s is below that of the one before, to a millionth of the blow in 2 s, and the total never
 // passes what the stop left.
@@ -185,8 +185,8 @@ TEST(Simulation, InAHeldPoseEnergyDoesNotGrow) {
   }
 }
 
-// DESIGN section 6 publishes how the held pose depends on the step: 0.1 to 0.65 % with joint regions, 1.8 %
-// without. Here as the rms distance, in % of the arm's length, of the pose at 1/120 s from that at 1/480 s.
+// The method's prototype showed how the held pose depends on the step: 0.1 to 0.65 % with joint regions, 1.8
+// % without. Here as the rms distance, in % of the arm's length, of the pose at 1/120 s from that at 1/480 s.
 // Measured with BDF2: 0.21, 0.41, 0.56 % at 60, 90, 120 degrees; 0.99 % at 120 degrees without joint regions.
 TEST(Simulation, TheHeldPoseDependsOnTheStepAsPublished) {
   const tests::Arm arm = tests::make_arm();

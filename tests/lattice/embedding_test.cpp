@@ -18,7 +18,7 @@ TEST(Embedding, ReproducesPointsInsideToRounding) {
       const Points at = tests::points_inside(mesh, 300, rng);
       const Embedding embedding = embed(mesh, at);
       EXPECT_TRUE(embedding.outside.empty()) << name;
-      // The promise of DESIGN section 3; the lattice is about 2 m across.
+      // The promise of embed(); the lattice is about 2 m across.
       EXPECT_LE((embedding.weights * mesh.points - at).rowwise().norm().maxCoeff(), 1e-12) << name;
       for (Eigen::Index i = 0; i < at.rows(); ++i) {
         EXPECT_GE(embedding.xi.row(i).minCoeff(), -1e-9);
