@@ -145,6 +145,8 @@ fem::SimulationOptions simulation_options(const Scene& scene) {
   options.step = scene.step;
   options.integrator =
       scene.integrator == Integrator::Bdf2 ? fem::Integrator::Bdf2 : fem::Integrator::BackwardEuler;
+  options.solver.precision =
+      scene.precision == Precision::Double ? fem::Precision::Double : fem::Precision::Float;
   options.gravity = scene.gravity;
   options.settle_limit = scene.settle;
   return options;

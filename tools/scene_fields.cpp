@@ -65,6 +65,7 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"gravity", &Scene::gravity, "gravity, Y up", "each component", {-1e4, 1e4}, "m/s^2", "0,-9.81,0"},
     {"step", &Scene::step, "time step", "h", {1e-6, 0.1}, "s", "1/120"},
     {"integrator", &Scene::integrator, "bdf2 or backward-euler (more damped, cannot fail)"},
+    {"precision", &Scene::precision, "of the factors: double, or float (faster, relative error near 3e-7)"},
     {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
     {"frames", &Scene::frames, "output frames A-B, both included; left out: the whole clip"},
     {"settle",
@@ -86,6 +87,7 @@ constexpr auto kFields = std::to_array<SceneField>({
 });
 
 const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
+const std::vector<std::string> kPrecisionNames{"double", "float"};          // in the enum's order
 const std::vector<std::string> kOutputSpaceNames{"file", "si"};             // in the enum's order
 
 /// A finite or infinite number, all of the text; nullopt for anything else, overflow included.
@@ -242,6 +244,7 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
           [](std::string Scene::*) {},
           [](PathMember) {},
           [](Integrator Scene::*) {},
+          [](Precision Scene::*) {},
           [](OutputSpace Scene::*) {},
           [&](int Scene::*member) { check_number(field, scene.*member, where); },
           [&](double Scene::*member) { check_number(field, scene.*member, where); },
@@ -284,6 +287,9 @@ void set_from_text(Scene& scene, const SceneField& field, std::string_view text,
                  [&](Integrator Scene::*member) {
                    scene.*member = parse_choice<Integrator>(kIntegratorNames, text, where);
                  },
+                 [&](Precision Scene::*member) {
+                   scene.*member = parse_choice<Precision>(kPrecisionNames, text, where);
+                 },
                  [&](OutputSpace Scene::*member) {
                    scene.*member = parse_choice<OutputSpace>(kOutputSpaceNames, text, where);
                  },
@@ -312,6 +318,7 @@ std::string flag_text(const Scene& scene, const SceneField& field) {
                                  : std::string();
           },
           [&](Integrator Scene::*member) { return choice(kIntegratorNames, scene.*member); },
+          [&](Precision Scene::*member) { return choice(kPrecisionNames, scene.*member); },
           [&](OutputSpace Scene::*member) { return choice(kOutputSpaceNames, scene.*member); },
       },
       field.member);

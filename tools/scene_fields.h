@@ -17,10 +17,10 @@ struct PathMember {
   std::string Scene::*path;
 };
 
-using SceneMember =
-    std::variant<bool Scene::*, int Scene::*, double Scene::*, std::optional<double> Scene::*,
-                 std::string Scene::*, PathMember, Eigen::Vector3d Scene::*,
-                 std::optional<FrameRange> Scene::*, Integrator Scene::*, OutputSpace Scene::*>;
+using SceneMember = std::variant<bool Scene::*, int Scene::*, double Scene::*, std::optional<double> Scene::*,
+                                 std::string Scene::*, PathMember, Eigen::Vector3d Scene::*,
+                                 std::optional<FrameRange> Scene::*, Integrator Scene::*, Precision Scene::*,
+                                 OutputSpace Scene::*>;
 
 /// An interval of numbers.
 struct Range {

@@ -71,6 +71,7 @@ output_space = "si"
 gravity = [0, 0, -9.81]
 step = "1/240"
 integrator = "backward-euler"
+precision = "float"
 fps = 23.976
 frames = "3-47"
 settle = 0
@@ -105,6 +106,7 @@ density = 900
   expected.gravity = {0.0, 0.0, -9.81};
   expected.step = 1.0 / 240.0;
   expected.integrator = Integrator::BackwardEuler;
+  expected.precision = Precision::Float;
   expected.fps = 23.976;
   expected.frames = FrameRange{3, 47};
   expected.settle = 0.0;
@@ -258,6 +260,7 @@ Scene random_scene(std::mt19937_64& rng) {
   scene.gravity = {unit(), -10.0 * unit(), 1e-7 * unit()};
   scene.step = 1e-6 + 0.09 * unit();
   scene.integrator = index(2) == 1 ? Integrator::BackwardEuler : Integrator::Bdf2;
+  scene.precision = index(2) == 1 ? Precision::Float : Precision::Double;
   scene.fps = 1.0 + 100.0 * unit();
   if (index(2) == 1) scene.frames = FrameRange{index(10), 10 + index(10)};
   scene.settle = 10.0 * unit();

@@ -84,6 +84,8 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
                              "24000/1001",
                              "--integrator",
                              "backward-euler",
+                             "--precision",
+                             "float",
                              "--frames",
                              "0-47",
                              "--settle",
@@ -109,6 +111,7 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
   EXPECT_EQ(scene.step, 1.0 / 240.0);
   EXPECT_EQ(scene.fps, 24000.0 / 1001.0);
   EXPECT_EQ(scene.integrator, Integrator::BackwardEuler);
+  EXPECT_EQ(scene.precision, Precision::Float);
   EXPECT_EQ(scene.frames, (FrameRange{0, 47}));
   EXPECT_EQ(scene.settle, 0.5);
   EXPECT_EQ(scene.threads, 3);

@@ -45,6 +45,21 @@ TEST_F(Simulate, DoesNotDependOnTheFrameRateOfItsOutput) {
   }
 }
 
+TEST_F(Simulate, MovesHardlyAtAllWhenItsFactorsAreFloats) {
+  const std::string flags = "--frames 0-8 --cells 300 --precision ";
+  simulate("hopper", "double", flags + "double");
+  simulate("hopper", "float", flags + "float");
+  const assets::Pc2Reader one((out("double") / "skin.pc2").string()),
+      other((out("float") / "skin.pc2").string());
+  float largest = 0.0F;
+  for (int k = 0; k <= 8; ++k)
+    largest = std::max(largest, (one.read(k) - other.read(k)).rowwise().norm().maxCoeff());
+  // A solve is off by about 3e-7 of its answer; 1e-5 of the 1.4 m height leaves room for a second of steps.
+  // More than nothing, or the flag does nothing.
+  EXPECT_LT(largest, 1.4e-5F);
+  EXPECT_GT(largest, 0.0F);
+}
+
 TEST_F(Simulate, TakesAStepThatDoesNotDivideTheFrameTime) {
   const nlohmann::json report = simulate("arm", "odd", "--frames 0-6 --fps 24 --step 0.0073 --cells 200");
   expect_sound(report, out("odd"), 7);
