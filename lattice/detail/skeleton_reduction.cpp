@@ -344,20 +344,27 @@ void Reduction::add_tips() {
     double area = 0.0;
     for (int s : served[j]) area += weights_.area[s];
     const bool is_anchor = result_.nodes[node_of_[j]].joint == j;
+    // The frame is the joint that carries the skin: a weightless joint at the same place (a control that
+    // scales or turns what is below it) may move otherwise.
+    int carrier = j;
+    for (int s : served[j])
+      if (node_of_[s] == node_of_[j] && weights_.area[s] > weights_.area[carrier]) carrier = s;
+    if (weights_.area[j] > 0.0) carrier = j;
     if (area > kOwnFrame * total_area_) {
       std::vector<double> vertex_weight(skin_.points.rows(), 0.0);
       for (int s : served[j])
         for (const auto& [v, w] : weights_.vertices[s]) vertex_weight[v] += w;
-      if (add_tip(j, is_anchor ? options_.smallest_bone : std::max(options_.smallest_bone, kContractedTip),
+      if (add_tip(carrier,
+                  is_anchor ? options_.smallest_bone : std::max(options_.smallest_bone, kContractedTip),
                   vertex_weight)) {
         continue;
       }
       if (is_anchor) {
         SoftFrame frame;
-        frame.frame = j;
+        frame.frame = carrier;
         frame.position = soft_position(j, vertex_weight);
         result_.soft_frames.push_back(frame);
-        report(j, "soft frame",
+        report(carrier, "soft frame",
                fmt::format("carries {:.2g} % of the skin but has no room for a bone",
                            100.0 * area / total_area_));
         continue;

@@ -114,7 +114,9 @@ TEST(GrazedOctants, AreThoseThatHoldASampleOfTheSkin) {
   int raised = 0;
   for (std::size_t c = 0; c < fill.size(); ++c) {
     for (std::size_t k = 0; k < 8; ++k) {
-      if (c == 3) EXPECT_EQ(fill[c][k], 0.5);
+      if (c == 3) {
+        EXPECT_EQ(fill[c][k], 0.5);
+      }
       if (fill[c][k] != kGrazedFill) continue;
       ++raised;
       // The octant's middle: half-way between the cell's middle and its corner k.
