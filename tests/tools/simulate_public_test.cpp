@@ -38,8 +38,8 @@ INSTANTIATE_TEST_SUITE_P(Shared, SimulatePublic,
                                            "characters/quaternius_Zombie.fbx", "quadrupeds/Fox.glb",
                                            "quadrupeds/quaternius_Dog.fbx", "quadrupeds/quaternius_Horse.fbx",
                                            "quadrupeds/quaternius_Wolf.glb"),
-                         [](const auto& info) {
-                           std::string name = fs::path(info.param).filename().string();
+                         [](const auto& rig) {
+                           std::string name = fs::path(rig.param).filename().string();
                            for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
                            return name;
                          });

@@ -38,7 +38,11 @@ inline Outcome run(const std::string& line) {
   return outcome;
 }
 
-inline std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
+inline std::string quoted(const fs::path& path) {
+  std::string text = "'";
+  text += path.string();
+  return text += "'";
+}
 
 inline std::string command_line(const std::string& arguments, const std::string& environment = {}) {
   return environment + " " + quoted(SINEW_COMMAND) + " " + arguments;
