@@ -15,8 +15,8 @@
 namespace sinew::fem {
 namespace {
 
-using lattice::Points;
 using detail::Coordinates;
+using lattice::Points;
 using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 /// Four lanes, of which three are used: the processor then works on pairs.
@@ -233,8 +233,8 @@ BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
     : impl_(std::make_unique<Impl>()) {
   impl_->body = &body;
   impl_->options = options;
-  impl_->coordinates =
-      options.basis == Basis::Nodal ? detail::nodal_coordinates(body) : detail::hierarchical_coordinates(body);
+  impl_->coordinates = options.basis == Basis::Nodal ? detail::nodal_coordinates(body)
+                                                     : detail::hierarchical_coordinates(body);
   impl_->build_systems();
 }
 BlendedSolver::~BlendedSolver() = default;
