@@ -57,6 +57,10 @@ FrameTree frame_tree(const lattice::ControlLattice& lattice, const skeleton::Ske
 }
 
 Eigen::Matrix3d polar_rotation(const Eigen::Matrix3d& matrix) {
+  // Most joints only turn: what is a rotation to rounding is its own polar factor to rounding.
+  constexpr double kRounding = 1e-13;
+  const Eigen::Matrix3d error = matrix.transpose() * matrix - Eigen::Matrix3d::Identity();
+  if (error.cwiseAbs().maxCoeff() < kRounding && matrix.determinant() > 0.0) return matrix;
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d u = svd.matrixU();
   if ((u * svd.matrixV().transpose()).determinant() < 0.0) u.col(2) *= -1.0;  // smallest singular value last

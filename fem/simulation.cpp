@@ -173,9 +173,9 @@ int Simulation::halvings_for(double begin, double h) const {
   for (int k = 1; k <= kSamples; ++k) {
     const PosedFrames next = pose_at(begin + h * k / kSamples);
     for (std::size_t f = 0; f < angle.size(); ++f) {
-      angle[f] += Eigen::AngleAxisd(
-                      Eigen::Matrix3d(previous.frames[f].rotation.transpose() * next.frames[f].rotation))
-                      .angle();
+      // |A - B|_F = 2 sqrt(2) sin(angle / 2) for rotations.
+      const double chord = (previous.frames[f].rotation - next.frames[f].rotation).norm();
+      angle[f] += 2.0 * std::asin(std::min(1.0, chord / std::sqrt(8.0)));
     }
     previous = next;
   }
