@@ -88,8 +88,9 @@ struct Common {
   Common() {
     cholmod_start(&common);
     common.supernodal = CHOLMOD_SUPERNODAL;
-    common.nmethods = 1;
+    common.nmethods = 2;  // the better of two orderings: a region may be too small for METIS to win
     common.method[0].ordering = CHOLMOD_METIS;
+    common.method[1].ordering = CHOLMOD_AMD;
     common.postorder = true;
     common.print = 0;
     common.final_ll = true;
