@@ -5,8 +5,9 @@
 /// Stopping on request: SIGINT and SIGTERM set a flag that long work polls.
 namespace sinew::tools {
 
-/// From now on the first SIGINT or SIGTERM only sets the flag; the second of its kind ends the process at
-/// once (its default action), as a user who insists expects. SIGPIPE and SIGXFSZ are ignored: a write that
+/// From now on the first SIGINT only sets the flag; the second ends the process at once (its default action),
+/// as a user who insists expects. SIGTERM waits until interrupt_signal fetches it. To be called before any
+/// thread is started. SIGPIPE and SIGXFSZ are ignored: a write that
 /// fails says so.
 void install_interrupt_handlers();
 
