@@ -5,8 +5,6 @@
 #include <pthread.h>
 #include <signal.h>
 
-#include <time.h>
-
 #include "tools/failure.h"
 
 namespace sinew::tools {
