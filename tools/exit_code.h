@@ -11,6 +11,7 @@ inline constexpr int kNumerical = 4;      ///< the numerics failed, or a gate re
 inline constexpr int kIo = 5;             ///< reading or writing failed.
 inline constexpr int kLimit = 6;          ///< a limit was reached: memory, time, counts.
 inline constexpr int kBusy = 7;           ///< the output holds another run or is in use.
+inline constexpr int kCheck = 8;          ///< a comparison or a check did not hold.
 inline constexpr int kSignalBase = 128;   ///< plus the signal's number: 130 SIGINT, 143 SIGTERM.
 
 }  // namespace sinew::tools::exit_code

@@ -20,6 +20,7 @@ namespace {
 
 /// One line per subcommand of tools/command.h that exists.
 void add_commands(CLI::App& app, CommandContext& context) {
+  add_compare_command(app, context);
   add_inspect_command(app, context);
   add_lattice_command(app, context);
   add_simulate_command(app, context);
@@ -99,7 +100,8 @@ int parse_and_run(int argc, const char* const* argv) {
   app.footer(
       "Exit codes: 0 done, 1 internal error, 2 usage or configuration, 3 bad input file, 4 numerical "
       "failure,\n"
-      "5 input/output, 6 limit reached, 7 output busy, 130/143 stopped by a signal.");
+      "5 input/output, 6 limit reached, 7 output busy, 8 a comparison did not hold, 130/143 stopped by a\n"
+      "signal.");
   CommandContext context;
   add_commands(app, context);
   try {
