@@ -45,13 +45,17 @@ Vector3d face_mean(const CellComplex& complex, const Cell& cell, int a, int c, i
   return Vector3d::Zero();
 }
 
-/// Corner k of a hexahedron (VTK order): determinant of its three edges, each of length 1.
-double scaled_corner(const std::array<Vector3d, 8>& hexahedron, int k) {
-  const std::array<int, 3>& n = kHexahedronCorners[k];
-  const Vector3d a = hexahedron[n[0]] - hexahedron[k], b = hexahedron[n[1]] - hexahedron[k],
-                 c = hexahedron[n[2]] - hexahedron[k];
+/// Determinant of three edges, each of length 1.
+double scaled_determinant(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
   const double lengths = a.norm() * b.norm() * c.norm();
   return lengths > 0.0 ? a.cross(b).dot(c) / lengths : 0.0;
+}
+
+/// At corner k of a hexahedron (VTK order).
+double scaled_corner(const std::array<Vector3d, 8>& hexahedron, int k) {
+  const std::array<int, 3>& n = kHexahedronCorners[k];
+  return scaled_determinant(hexahedron[n[0]] - hexahedron[k], hexahedron[n[1]] - hexahedron[k],
+                            hexahedron[n[2]] - hexahedron[k]);
 }
 
 std::string list(const std::vector<int>& indices) {
@@ -76,6 +80,17 @@ double min_dihedral_degrees(const CellComplex& complex, const Cell& cell) {
     }
   }
   return smallest * 180.0 / std::numbers::pi;
+}
+
+double min_corner_jacobian(const CellComplex& complex, const Cell& cell) {
+  double smallest = 1.0;
+  for (int c = 0; c < num_corners(cell.type); ++c) {
+    const auto [i, j, k] = corner_neighbours(cell.type, c);
+    const Vector3d p = point(complex, cell, c);
+    smallest = std::min(smallest, scaled_determinant(point(complex, cell, i) - p, point(complex, cell, j) - p,
+                                                     point(complex, cell, k) - p));
+  }
+  return smallest;
 }
 
 double min_scaled_jacobian(const CellComplex& complex, const Cell& cell) {
