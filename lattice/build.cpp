@@ -42,7 +42,7 @@ struct Draft {
 };
 
 /// Retries in order, cheapest change first.
-std::vector<Attempt> attempts(int max_retries) {
+std::vector<Attempt> attempts(const BuildOptions& options) {
   std::vector<Attempt> list(7);
   list[1].h_factor = 0.93;
   list[2].h_factor = 1.08;
@@ -51,7 +51,8 @@ std::vector<Attempt> attempts(int max_retries) {
   list[5].points.exclusion = 0.7;
   list[6].reduction.chain_degrees = 25.0;
   list[6].reduction.too_close = 0.3;
-  list.resize(std::min<std::size_t>(list.size(), static_cast<std::size_t>(max_retries) + 1));
+  list.resize(std::min<std::size_t>(list.size(), static_cast<std::size_t>(options.max_retries) + 1));
+  for (Attempt& attempt : list) attempt.reduction.tip_bones = options.tip_bones;
   return list;
 }
 
@@ -76,14 +77,14 @@ double smallest_edge_length(const RigInput& input, int wanted) {
 }
 
 /// Secant search, in logarithms, for the h that gives the wanted number of cells.
-double find_edge_length(const RigInput& input, int wanted) {
+double find_edge_length(const RigInput& input, int wanted, const Attempt& attempt) {
   const double target = std::log(static_cast<double>(wanted));
   const double lowest = std::log(smallest_edge_length(input, wanted));
   double x = std::log(0.1), best_x = x, best_error = std::numeric_limits<double>::infinity();
   double old_x = 0.0, old_y = 0.0, slope = -2.3;  // cells go like h^-3 in a bulk, h^-2 in a skin
   for (int step = 0; step < kSearchSteps; ++step) {
     const double h = std::exp(x);
-    const Draft draft = make_draft(input, h, {}, sample_skin(input.unit_skin, h));
+    const Draft draft = make_draft(input, h, attempt, sample_skin(input.unit_skin, h));
     const double y = std::log(static_cast<double>(std::max<std::size_t>(1, draft.cells.size())));
     if (std::abs(y - target) < best_error) best_error = std::abs(y - target), best_x = x;
     if (best_error < kCloseEnough) break;
@@ -148,27 +149,15 @@ bool is_better(const std::vector<GateFailure>& a, const std::vector<GateFailure>
 
 }  // namespace
 
-void BuildOptions::validate() const {
-  if (cells < 20) throw std::invalid_argument(fmt::format("cells: got {}, expected at least 20", cells));
-  if (max_retries < 0)
-    throw std::invalid_argument(fmt::format("max_retries: got {}, expected at least 0", max_retries));
-  if (!(min_dihedral_degrees >= 0.0 && min_dihedral_degrees < 70.0)) {
-    throw std::invalid_argument(
-        fmt::format("min_dihedral_degrees: got {}, expected a value in [0, 70)", min_dihedral_degrees));
-  }
-  if (!(min_scaled_jacobian >= 0.0 && min_scaled_jacobian < 0.7)) {
-    throw std::invalid_argument(
-        fmt::format("min_scaled_jacobian: got {}, expected a value in [0, 0.7)", min_scaled_jacobian));
-  }
-}
-
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
   options.validate();
-  const RigInput input = make_rig_input(skin, joints);
-  const double h = find_edge_length(input, options.cells);
+  const RigInput input = make_rig_input(skin, joints, options);
+  const std::vector<Attempt> list = attempts(options);
+  const double h = options.cell_size ? *options.cell_size / input.unit_skin.scale
+                                     : find_edge_length(input, options.cells, list.front());
   BuildResult best;
   int tried = 0;
-  for (const Attempt& attempt : attempts(options.max_retries)) {
+  for (const Attempt& attempt : list) {
     BuildResult result;
     result.lattice = make_attempt(input, h * attempt.h_factor, attempt);
     const Inspection found = inspect(result.lattice, skin, input.unit_skin);

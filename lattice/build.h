@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,10 +9,37 @@
 
 namespace sinew::lattice {
 
+/// Cells round the bones of one joint are this much larger (> 1) or smaller (< 1) than elsewhere.
+struct SizeFactor {
+  int joint = -1;       ///< index into the joint tree.
+  double factor = 1.0;  ///< target edge there over the lattice's target edge [-]; in [0.2, 5].
+};
+
+/// Whether leaf joints that carry skin get a bone of their own.
+enum class TipBones { On, Off };
+
+/// Whether the builder looks for a plane of symmetry and mirrors one half.
+enum class Symmetry { Auto, Off };
+
 /// Controls of the lattice builder.
 struct BuildOptions {
   /// Wanted number of cells [-]; >= 20. The secant search on h lands within about 10 %.
   int cells = 1000;
+  /// Target edge h [m]; > 0. Where it is given, `cells` is not used and nothing is searched.
+  std::optional<double> cell_size = std::nullopt;
+  /// Finer and coarser places; the size between bones changes smoothly. A joint may be named once. With
+  /// factors the wanted number of cells holds for the whole lattice as before.
+  std::vector<SizeFactor> size_factors = {};
+  /// Joints that take part: where not empty, all others are treated as excluded.
+  std::vector<int> include = {};
+  /// Joints that get neither a bone nor a frame: their children hang on the joint above, and so does their
+  /// skin (where none is above, on the nearest below). At least one joint must be left.
+  std::vector<int> exclude = {};
+  /// With Off, the skin of leaf joints is held by soft frames.
+  TipBones tip_bones = TipBones::On;
+  /// With Auto, a rig that is its own mirror image to 1e-5 of its size gets a lattice that is its own mirror
+  /// image.
+  Symmetry symmetry = Symmetry::Auto;
   /// Retries after a failed gate; 0 = one attempt only.
   int max_retries = 6;
   /// Gate thresholds.
@@ -21,6 +49,10 @@ struct BuildOptions {
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;
 };
+
+/// Per joint whether `options` leave it out. Throws std::invalid_argument where they name a joint that does
+/// not exist, or leave none.
+std::vector<bool> excluded_joints(const BuildOptions& options, int num_joints);
 
 /// What the gate found; empty = passed.
 struct GateFailure {

@@ -45,7 +45,8 @@ std::vector<FloatingSkin> skin_of_components(const RigInput& input, const CellLo
     const int cell = locator.find(p, kInsideSlack);
     if (cell < 0 || component_of[cell] < 0) continue;
     FloatingSkin& part = parts[component_of[cell]];
-    for (const Influence& influence : input.skin.weights[v]) part.weight[influence.frame] += influence.weight;
+    for (const Influence& influence : input.skin.weights[v])
+      part.weight[input.stand_in[influence.frame]] += influence.weight;
     part.sum += p;
     part.count += 1.0;
   }

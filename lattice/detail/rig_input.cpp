@@ -39,17 +39,38 @@ void check_weights(const Surface& skin, int num_joints) {
   if (!(total > 0.0)) throw std::invalid_argument("lattice: no skin vertex has a weight");
 }
 
+/// Takes the excluded joints out of the tree.
+void bypass(const std::vector<bool>& excluded, std::vector<int>& parents) {
+  for (int j = 0; j < static_cast<int>(parents.size()); ++j) {
+    int& parent = parents[j];
+    while (parent >= 0 && excluded[parent]) parent = parents[parent];
+  }
+  for (int j = 0; j < static_cast<int>(parents.size()); ++j)
+    if (excluded[j]) parents[j] = -1;
+}
+
+std::vector<int> stand_ins(const std::vector<bool>& excluded, const std::vector<int>& parents) {
+  std::vector<int> taking_part;
+  for (int j = 0; j < static_cast<int>(parents.size()); ++j)
+    if (!excluded[j]) taking_part.push_back(j);
+  return frame_of_joint(parents, taking_part);
+}
+
 }  // namespace
 
-RigInput make_rig_input(const Surface& skin, const JointTree& joints) {
+RigInput make_rig_input(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
   check_joints(joints);
   check_weights(skin, static_cast<int>(joints.parents.size()));
   UnitSkin unit = make_unit_skin(skin);
   JointTree unit_joints = joints;
   for (Eigen::Index j = 0; j < joints.positions.rows(); ++j)
     unit_joints.positions.row(j) = unit.to_unit(joints.positions.row(j).transpose()).transpose();
-  JointWeights weights = joint_weights(unit, joints);
-  return {skin, joints, std::move(unit), std::move(unit_joints), std::move(weights)};
+  const std::vector<bool> excluded = excluded_joints(options, static_cast<int>(joints.parents.size()));
+  std::vector<int> stand_in = stand_ins(excluded, joints.parents);
+  bypass(excluded, unit_joints.parents);
+  JointWeights weights = joint_weights(unit, unit_joints, stand_in);
+  weights.excluded = excluded;
+  return {skin, joints, std::move(unit), std::move(unit_joints), std::move(weights), std::move(stand_in)};
 }
 
 }  // namespace sinew::lattice::detail

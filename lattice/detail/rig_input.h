@@ -1,5 +1,6 @@
 #pragma once
 
+#include "lattice/build.h"
 #include "lattice/detail/skeleton_reduction.h"
 #include "lattice/detail/unit_skin.h"
 #include "lattice/surface.h"
@@ -12,12 +13,16 @@ struct RigInput {
   const Surface& skin;      ///< rest coordinates [m].
   const JointTree& joints;  ///< rest coordinates [m].
   UnitSkin unit_skin;
+  /// In unit coordinates; children of an excluded joint hang on the joint above it.
   JointTree unit_joints;
   JointWeights weights;
+  /// Per joint the one that its skin weight counts for: itself unless it is excluded.
+  std::vector<int> stand_in;
 };
 
 /// Throws std::invalid_argument where there is no triangle, no joint or no weight, an index does not exist or
-/// a coordinate is not finite. `skin` and `joints` must outlive the result.
-RigInput make_rig_input(const Surface& skin, const JointTree& joints);
+/// a coordinate is not finite, or where the options name such a joint or exclude all. `skin` and `joints`
+/// must outlive the result.
+RigInput make_rig_input(const Surface& skin, const JointTree& joints, const BuildOptions& options = {});
 
 }  // namespace sinew::lattice::detail

@@ -90,7 +90,9 @@ void Reduction::prune() {
     if (weights_.subtree_area[j] > limit) continue;
     kept_[j] = false;
     const int parent = joints_.parents[j];
-    if (parent < 0 || kept_[parent]) {
+    if (weights_.excluded[j]) {
+      report(j, "excluded", "the options leave it out; what hung on it hangs on the joint above");
+    } else if (parent < 0 || kept_[parent]) {
       report(j, "pruned", "no skin weight on it or below it");
     }
   }
@@ -272,6 +274,7 @@ std::string Reduction::conflict(const Vector3d& a, const Vector3d& b, int node) 
 }
 
 bool Reduction::add_tip(int joint, double smallest, const std::vector<double>& vertex_weight) {
+  if (options_.tip_bones == TipBones::Off) return false;
   const int node = node_of_[joint];
   const Vector3d from = result_.nodes[node].position;
   Vector3d centroid = Vector3d::Zero();
@@ -365,8 +368,9 @@ void Reduction::add_tips() {
         frame.position = soft_position(j, vertex_weight);
         result_.soft_frames.push_back(frame);
         report(carrier, "soft frame",
-               fmt::format("carries {:.2g} % of the skin but has no room for a bone",
-                           100.0 * area / total_area_));
+               fmt::format("carries {:.2g} % of the skin but {}", 100.0 * area / total_area_,
+                           options_.tip_bones == TipBones::On ? "has no room for a bone"
+                                                              : "has no bone, and tip bones are off"));
         continue;
       }
     }
@@ -415,14 +419,18 @@ int nearest_descendant(int joint, const std::vector<std::vector<int>>& children,
 
 }  // namespace
 
-JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints) {
+JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints, const std::vector<int>& stand_in) {
   const int n = static_cast<int>(joints.parents.size());
-  JointWeights result{std::vector<double>(n, 0.0), {}, std::vector<std::vector<std::pair<int, double>>>(n)};
+  JointWeights result{std::vector<double>(n, 0.0),
+                      {},
+                      std::vector<std::vector<std::pair<int, double>>>(n),
+                      std::vector<bool>(n, false)};
   for (std::size_t v = 0; v < skin.weights.size(); ++v)
     for (const Influence& influence : skin.weights[v]) {
       if (!(influence.weight > 0.0)) continue;
-      result.area[influence.frame] += influence.weight * skin.areas[v];
-      result.vertices[influence.frame].emplace_back(static_cast<int>(v), influence.weight);
+      const int joint = stand_in[influence.frame];
+      result.area[joint] += influence.weight * skin.areas[v];
+      result.vertices[joint].emplace_back(static_cast<int>(v), influence.weight);
     }
   result.subtree_area = result.area;
   for (int j = n - 1; j >= 0; --j)

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "lattice/build.h"
 #include "lattice/control_lattice.h"
 #include "lattice/detail/unit_skin.h"
 
@@ -15,6 +16,7 @@ struct ReductionOptions {
   double cut_length = 0.5;      ///< so long a bone may be cut.
   double chain_degrees = 15.0;  ///< siblings within this angle are chained.
   double too_close = 0.15;      ///< bones nearer than this cannot both be edges.
+  TipBones tip_bones = TipBones::On;
 };
 
 /// A point of the reduced skeleton: several joints may share it after contraction.
@@ -47,8 +49,10 @@ struct JointWeights {
   std::vector<double> subtree_area;  ///< the same with all descendants.
   /// Vertices of each joint with their weights.
   std::vector<std::vector<std::pair<int, double>>> vertices;
+  std::vector<bool> excluded;  ///< joints that the user left out: no weight, no parent, no child.
 };
-JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints);
+/// `stand_in` says for every joint which one its weight counts for.
+JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints, const std::vector<int>& stand_in);
 
 /// Reduces the joint tree at target edge `h` (unit coordinates, like the positions of `joints`).
 ReducedSkeleton reduce_skeleton(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights,

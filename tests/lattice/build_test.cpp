@@ -151,6 +151,63 @@ TEST(Build, GivesTheSameBitsTwice) {
     EXPECT_EQ(a.complex.cells[c].vertices, b.complex.cells[c].vertices);
 }
 
+TEST(Build, TakesACellSizeInMetres) {
+  const Limb limb = arm();
+  const auto cells_of_size = [&](double size) {
+    const ControlLattice lattice = build(limb.skin, limb.joints, {.cell_size = size}).lattice;
+    EXPECT_DOUBLE_EQ(lattice.edge_length, size);
+    double sum = 0.0;
+    for (const Cell& cell : lattice.complex.cells) sum += cell_volume(lattice.complex, cell);
+    return sum / static_cast<double>(lattice.complex.cells.size());
+  };
+  // A cube of the body-centred grid has the side 2h/sqrt(3) and twelve cells; pulling the boundary to the
+  // skin makes the outer ones smaller, by half at most.
+  const double grid_cell = std::pow(2.0 / std::sqrt(3.0), 3) / 12.0;
+  for (const double size : {0.2, 0.1, 0.05}) {
+    const double volume = cells_of_size(size) / (size * size * size);
+    EXPECT_GT(volume, 0.5 * grid_cell) << size;
+    EXPECT_LT(volume, grid_cell) << size;
+  }
+}
+
+/// Names of the lattice's bones and of its soft frames.
+std::vector<std::string> frames(const ControlLattice& lattice, const Limb& limb) {
+  std::vector<std::string> names;
+  for (const LatticeBone& bone : lattice.bones) names.push_back(bone.name);
+  for (const SoftFrame& frame : lattice.soft_frames)
+    names.push_back("soft " + limb.joints.names[frame.frame]);
+  return names;
+}
+
+TEST(Build, LeavesExcludedJointsOut) {
+  const Limb limb = arm();
+  const ControlLattice lattice = build(limb.skin, limb.joints, {.cells = 200, .exclude = {1}}).lattice;
+  // Without its elbow the arm is one straight bone from the shoulder to its end.
+  EXPECT_THAT(frames(lattice, limb), testing::ElementsAre("upper"));
+  EXPECT_EQ(lattice.bones[0].rest_start, Vector3d(0, 0.1, 0));
+  EXPECT_TRUE(lattice.bones[0].tip);
+  EXPECT_THAT(lattice.frame_of_joint, testing::ElementsAre(0, 0, 0));
+  ASSERT_FALSE(lattice.changes.empty());
+  EXPECT_EQ(lattice.changes[0].joint, "lower");
+  EXPECT_EQ(lattice.changes[0].what, "excluded");
+  const ControlLattice same = build(limb.skin, limb.joints, {.cells = 200, .include = {0, 2}}).lattice;
+  EXPECT_EQ(lattice.complex.points, same.complex.points);
+}
+
+TEST(Build, HangsTheSkinAboveAllBonesOnTheNearestBelow) {
+  const Limb limb = arm();
+  const ControlLattice lattice = build(limb.skin, limb.joints, {.cells = 200, .exclude = {0}}).lattice;
+  EXPECT_THAT(frames(lattice, limb), testing::ElementsAre("lower"));
+  EXPECT_THAT(lattice.frame_of_joint, testing::ElementsAre(1, 1, 1));
+}
+
+TEST(Build, HoldsLeafJointsBySoftFramesWithoutTipBones) {
+  const Limb limb = arm();
+  const ControlLattice lattice =
+      build(limb.skin, limb.joints, {.cells = 200, .tip_bones = TipBones::Off}).lattice;
+  EXPECT_THAT(frames(lattice, limb), testing::ElementsAre("upper", "soft lower"));
+}
+
 TEST(Build, RefusesWhatItCannotUse) {
   const auto message = [](const Limb& limb, const BuildOptions& options = {}) -> std::string {
     try {
@@ -179,6 +236,14 @@ TEST(Build, RefusesWhatItCannotUse) {
   limb.skin.weights[5] = {{9, 1.0}};
   EXPECT_EQ(message(limb), "lattice: skin vertex 5 hangs on joint 9, which does not exist");
   EXPECT_EQ(message(arm(), {.cells = 3}), "cells: got 3, expected at least 20");
+  EXPECT_EQ(message(arm(), {.cell_size = -0.1}), "cell_size: got -0.1, expected a length above 0 [m]");
+  EXPECT_EQ(message(arm(), {.size_factors = {{1, 0.1}}}),
+            "size_factors: got 0.1, expected a factor in [0.2, 5]");
+  EXPECT_EQ(message(arm(), {.size_factors = {{1, 0.5}, {1, 2.0}}}),
+            "size_factors: got 1, expected every joint at most once");
+  EXPECT_EQ(message(arm(), {.size_factors = {{3, 0.5}}}), "size_factors: got joint 3, expected 0 ... 2");
+  EXPECT_EQ(message(arm(), {.include = {7}}), "include: got joint 7, expected 0 ... 2");
+  EXPECT_EQ(message(arm(), {.exclude = {0, 1, 2}}), "exclude: all 3 joints, expected at least one left");
 }
 
 }  // namespace
