@@ -5,9 +5,27 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "fem/placement.h"
+
 namespace sinew::fem {
 
 using lattice::Points;
+
+namespace {
+
+constexpr int kMostHalvings = 8;          ///< of a step: for fast frames and for solves that fail.
+constexpr int kStepsBetweenChanges = 10;  ///< each change restarts BDF2, and a restart is first order.
+
+/// A model by its name, for members that need one at once.
+const ModelInfo* model_named(const std::string& name) {
+  const ModelInfo* info = find_model(name);
+  if (info != nullptr) return info;
+  std::string known;
+  for (const ModelInfo& model : models()) known.append(known.empty() ? "" : ", ").append(model.name);
+  throw std::invalid_argument("model: got " + name + ", expected one of " + known);
+}
+
+}  // namespace
 
 void SimulationOptions::validate() const {
   const auto require = [](bool holds, const char* field, double value, const char* rule) {
@@ -19,39 +37,8 @@ void SimulationOptions::validate() const {
   require(settle_limit >= 0.0, "settle", settle_limit, ">= 0 s");
   require(gravity.allFinite(), "gravity", gravity.norm(), "finite numbers");
   require(solver.rings >= 0, "rings", solver.rings, ">= 0");
+  model_named(model);
 }
-
-namespace {
-
-/// x = sum_f s_f T_f X: the skinned lattice.
-Points skinned(const Body& body, const PosedFrames& posed) {
-  Points x = Points::Zero(body.mesh.num_vertices(), 3);
-  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
-      sum += it.value() * (posed.frames[static_cast<std::size_t>(it.col())].from_rest *
-                           body.mesh.points.row(a).transpose());
-    }
-    x.row(a) = sum.transpose();
-  }
-  return x;
-}
-
-/// Inactive vertices at the mean of their parents, so that the state lies in the space of the active
-/// functions.
-void fill_inactive_leaves(const Body& body, Points& x) {
-  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
-    const int vertex = body.mesh.vertices[static_cast<std::size_t>(a)];
-    if (body.hierarchy.level(vertex) == 0) continue;
-    if (std::binary_search(body.mesh.functions.begin(), body.mesh.functions.end(), vertex)) continue;
-    Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
-    const auto parents = body.hierarchy.parents(vertex);
-    for (int p : parents) mean += x.row(body.mesh.leaf_of_vertex[static_cast<std::size_t>(p)]);
-    x.row(a) = mean / static_cast<double>(parents.size());
-  }
-}
-
-}  // namespace
 
 Simulation::Simulation(const Body& body, Motion motion, double start_time, const SimulationOptions& options,
                        std::function<bool()> should_stop)
@@ -59,22 +46,28 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
       motion_(std::move(motion)),
       options_(options),
       should_stop_(std::move(should_stop)),
-      solver_(body, options.solver),
+      info_(model_named(options.model)),
+      model_(info_->make(body, options.solver)),
       start_(start_time) {
   options_.validate();
+  // Flesh without inertia stands at the end of every step; a start of BDF2 would extrapolate beyond it.
+  if (!info_->dynamic) options_.integrator = Integrator::BackwardEuler;
   now_ = pose_at(start_time);
   past_ = now_;
   state_.time = start_time;
-  state_.x = skinned(body_, now_);
-  set_bones(now_, state_.x);
-  fill_inactive_leaves(body_, state_.x);
+  state_.x = skinned_positions(body_, now_);
   state_.v = Points::Zero(state_.x.rows(), 3);
   before_ = state_;
 }
 
-void Simulation::set_bones(const PosedFrames& posed, Points& x) const {
-  for (const BoneVertex& bone : body_.bones.vertices)
-    x.row(bone.vertex) = bone_position(bone, posed.joints).transpose();
+/// The status of a solve that failed, with the time of the state it started from.
+SimulationReport Simulation::failed(const SolveReport& solve) const {
+  SimulationReport report;
+  report.status = solve.status == SolveStatus::NotPositiveDefinite ? SimulationStatus::NotPositiveDefinite
+                                                                   : SimulationStatus::NoConvergence;
+  report.time = state_.time;
+  report.message = solve.message + " at " + std::to_string(state_.time) + " s";
+  return report;
 }
 
 bool Simulation::check(SimulationReport& report) const {
@@ -85,7 +78,7 @@ bool Simulation::check(SimulationReport& report) const {
     if (!finite) worst = static_cast<int>(a);
   }
   if (worst < 0) {
-    const Points home = skinned(body_, now_);
+    const Points home = skinned_frames(body_, now_);
     double farthest = 0.0;
     for (Eigen::Index a = 0; a < state_.x.rows(); ++a) {
       const double distance = (state_.x.row(a) - home.row(a)).norm();
@@ -115,27 +108,30 @@ bool Simulation::check(SimulationReport& report) const {
 SimulationReport Simulation::settle() {
   SimulationReport report;
   report.time = state_.time;
-  const double h = options_.step;
-  const Factor::Report factor = solver_.prepare(h, options_.integrator);
-  if (!factor.ok) {
-    report.status = SimulationStatus::NotPositiveDefinite;
-    report.message = factor.message;
-    return report;
-  }
-  const double eta_h = stage_of(options_.integrator).eta * h;
-  // Implicit drag at the critical rate 2 w0: the equilibrium is that of the run's own matrices.
-  const double keep = 1.0 / (1.0 + 4.0 * std::numbers::pi * body_.damping.frequency * h);
-  const long limit = std::lround(std::ceil(options_.settle_limit / h));
+  const double eta_h = stage_of(options_.integrator).eta * options_.step;
+  const long limit =
+      info_->dynamic ? std::lround(std::ceil(options_.settle_limit / options_.step)) : 0;  // steps
   PosedFrames earlier = now_, later = now_;
-  earlier.time -= h;
-  later.time += h;
+  Points v;
+  int halvings = 0, good_steps = 0;
   for (long n = 0; n < limit; ++n) {
-    const StagePoses poses{&earlier, &now_, &later};
-    const Points v = solver_.stage_velocity(state_, state_.x, state_.v, poses, h, options_.integrator,
-                                            options_.gravity, false);
+    const double h = options_.step * std::exp2(-halvings);
+    earlier.time = now_.time - h;
+    later.time = now_.time + h;
+    SolveReport solve = model_->prepare(h, options_.integrator);
+    if (solve.ok())
+      solve = model_->solve_stage(stage(state_.x, state_.v, {&earlier, &now_, &later}, h, false), v);
+    if (solve.status == SolveStatus::NoConvergence && halvings < kMostHalvings) {
+      ++halvings;
+      good_steps = 0;
+      continue;
+    }
+    if (!solve.ok()) return failed(solve);
+    // Implicit drag at the critical rate 2 w0: the equilibrium is that of the run's own matrices.
+    const double keep = 1.0 / (1.0 + 4.0 * std::numbers::pi * body_.damping.frequency * h);
     state_.x += h * v;
     state_.v = keep * v;
-    set_bones(now_, state_.x);
+    place_bones(body_, now_, state_.x);
     ++report.steps;
     report.speed = v.rowwise().norm().maxCoeff();
     if (!check(report)) return report;
@@ -143,7 +139,11 @@ SimulationReport Simulation::settle() {
       report.status = SimulationStatus::Stopped;
       return report;
     }
-    if (report.speed < options_.settle_speed) break;
+    if (halvings > 0 && ++good_steps == kStepsBetweenChanges) {
+      --halvings;
+      good_steps = 0;
+    }
+    if (halvings == 0 && report.speed < options_.settle_speed) break;
   }
   // The motion may start at full speed: flesh that moves with its bones feels no jolt.
   const PosedFrames next = pose_at(start_ + eta_h);
@@ -166,8 +166,8 @@ SimulationReport Simulation::settle() {
 }
 
 int Simulation::halvings_for(double begin, double h) const {
+  if (!info_->dynamic) return 0;
   constexpr int kSamples = 4;  // a full turn within one step must not look like standing still
-  constexpr int kMost = 8;
   std::vector<double> angle(body_.tree.frames.size(), 0.0);
   PosedFrames previous = now_;
   for (int k = 1; k <= kSamples; ++k) {
@@ -181,47 +181,57 @@ int Simulation::halvings_for(double begin, double h) const {
   }
   const double largest = angle.empty() ? 0.0 : *std::max_element(angle.begin(), angle.end());
   int halvings = 0;
-  while (halvings < kMost && largest > options_.largest_turn * std::exp2(halvings)) ++halvings;
+  while (halvings < kMostHalvings && largest > options_.largest_turn * std::exp2(halvings)) ++halvings;
   return halvings;
+}
+
+StageProblem Simulation::stage(const Points& x_h, const Points& v_h, const StagePoses& poses, double h,
+                               bool use_past) const {
+  StageProblem problem;
+  problem.state = &state_;
+  problem.x_h = &x_h;
+  problem.v_h = &v_h;
+  problem.poses = poses;
+  problem.h = h;
+  problem.integrator = options_.integrator;
+  problem.gravity = options_.gravity;
+  problem.use_past = use_past;
+  return problem;
 }
 
 SimulationReport Simulation::step_once(double h) {
   SimulationReport report;
-  const Factor::Report factor = solver_.prepare(h, options_.integrator);
-  if (!factor.ok) {
-    report.status = SimulationStatus::NotPositiveDefinite;
-    report.message = factor.message + " at " + std::to_string(state_.time) + " s";
-    report.time = state_.time;
-    return report;
-  }
+  SolveReport solve = model_->prepare(h, options_.integrator);
+  if (!solve.ok()) return failed(solve);
   const double end = state_.time + h;
   const bool bdf2 = options_.integrator == Integrator::Bdf2;
   const bool regular = bdf2 && state_.has_past() && last_h_ == h;
   const PosedFrames next = pose_at(end);
-  const Stage stage = stage_of(options_.integrator);
+  const Stage scheme = stage_of(options_.integrator);
   const StagePoses poses{has_before_ ? &past_ : nullptr, &now_, &next};
   State after;
   after.time = end;
   if (regular) {
     const Points x_h = (4.0 * state_.x - state_.x_past) / 3.0;
     const Points v_h = (4.0 * state_.v - state_.v_past) / 3.0;
-    after.v = solver_.stage_velocity(state_, x_h, v_h, poses, h, options_.integrator, options_.gravity, true);
-    after.x = x_h + stage.eta * h * after.v;
+    solve = model_->solve_stage(stage(x_h, v_h, poses, h, true), after.v);
+    if (!solve.ok()) return failed(solve);
+    after.x = x_h + scheme.eta * h * after.v;
   } else if (bdf2) {
     // Start and restart: one theta step to t + 2h/3 with the same factor, extrapolated to the end of the
     // step.
-    const PosedFrames middle = pose_at(state_.time + stage.eta * h);
-    const StagePoses start{poses.before, &now_, &middle};
-    const Points v = solver_.stage_velocity(state_, state_.x, state_.v, start, h, options_.integrator,
-                                            options_.gravity, false);
+    const PosedFrames middle = pose_at(state_.time + scheme.eta * h);
+    Points v;
+    solve = model_->solve_stage(stage(state_.x, state_.v, {poses.before, &now_, &middle}, h, false), v);
+    if (!solve.ok()) return failed(solve);
     after.x = state_.x + h * v;
-    after.v = state_.v + (v - state_.v) / stage.theta;
+    after.v = state_.v + (v - state_.v) / scheme.theta;
   } else {
-    after.v = solver_.stage_velocity(state_, state_.x, state_.v, poses, h, options_.integrator,
-                                     options_.gravity, false);
+    solve = model_->solve_stage(stage(state_.x, state_.v, poses, h, false), after.v);
+    if (!solve.ok()) return failed(solve);
     after.x = state_.x + h * after.v;
   }
-  set_bones(next, after.x);
+  place_bones(body_, next, after.x);
   before_ = std::move(state_);
   if (bdf2) {
     after.x_past = before_.x;
@@ -239,7 +249,6 @@ SimulationReport Simulation::step_once(double h) {
 }
 
 SimulationReport Simulation::advance_to(double time) {
-  constexpr int kStepsBetweenChanges = 10;  // each change restarts BDF2, and a restart is first order
   SimulationReport total;
   total.time = state_.time;
   while (state_.time < time) {
@@ -253,6 +262,12 @@ SimulationReport Simulation::advance_to(double time) {
     }
     const int parts = 1 << halvings_;
     const SimulationReport report = step_once(options_.step / parts);
+    if (report.status == SimulationStatus::NoConvergence && halvings_ < kMostHalvings) {
+      ++halvings_;
+      part_ *= 2;
+      steps_since_change_ = 0;
+      continue;
+    }
     ++total.steps;
     ++steps_since_change_;
     total.time = report.time;
@@ -277,6 +292,7 @@ Points Simulation::positions_at(double time) const {
   const double theta = span > 0.0 ? std::clamp((time - before_.time) / span, 0.0, 1.0) : 1.0;
   if (theta >= 1.0) return state_.x;
   const PosedFrames posed = pose_at(time);
+  if (!info_->dynamic) return skinned_positions(body_, posed);
   Points x = Points::Zero(state_.x.rows(), 3);
   for (Eigen::Index a = 0; a < x.rows(); ++a) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -289,7 +305,7 @@ Points Simulation::positions_at(double time) const {
     }
     x.row(a) = sum.transpose();
   }
-  set_bones(posed, x);
+  place_bones(body_, posed, x);
   return x;
 }
 

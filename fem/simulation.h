@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "fem/blended_solver.h"
 #include "fem/measures.h"
+#include "fem/models/model.h"
 
 /// The time loop: settles the flesh, steps it along a motion, and samples it at any time between steps. Knows
 /// no files.
@@ -23,13 +23,15 @@ struct SimulationOptions {
   double settle_speed = 1e-3;                ///< settled when nothing moves faster [m/s].
   /// A frame that turns more in one step halves the step, again and again [rad].
   double largest_turn = 15.0 * 3.14159265358979323846 / 180.0;
+  /// Which model of the flesh steps: a name of the registry (fem/models/model.h).
+  std::string model{kDefaultModel};
   SolverOptions solver;
 
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;
 };
 
-enum class SimulationStatus { Ok, NotPositiveDefinite, Diverged, Stopped };
+enum class SimulationStatus { Ok, NotPositiveDefinite, NoConvergence, Diverged, Stopped };
 
 /// How a call ended; `message` names time and place.
 struct SimulationReport {
@@ -51,9 +53,9 @@ class Simulation {
   /// it the motion's velocity, so that nothing jolts at the first frame. Same step and matrices as the run.
   [[nodiscard]] SimulationReport settle();
 
-  /// Steps, or sub-steps where a frame turns fast, until state().time >= time; does nothing when it is there
-  /// already. Throws std::invalid_argument naming joint and time where the motion gives a frame that is not
-  /// finite or has no volume; the state stays the last good one.
+  /// Steps, or sub-steps where a frame turns fast or the model's solve fails, until state().time >= time;
+  /// does nothing when it is there already. Throws std::invalid_argument naming joint and time where the
+  /// motion gives a frame that is not finite or has no volume; the state stays the last good one.
   [[nodiscard]] SimulationReport advance_to(double time);
 
   const State& state() const { return state_; }
@@ -65,20 +67,23 @@ class Simulation {
   Measures measures_at(double time) const;
   /// The embedded skin: rows of `positions`.
   lattice::Points skin_of(const lattice::Points& positions) const { return body_.skin.weights * positions; }
-  SolverCounts counts() const { return solver_.counts(); }
+  SolverCounts counts() const { return model_->counts(); }
 
  private:
   PosedFrames pose_at(double time) const { return pose_frames(body_.tree, motion_(time), time); }
   int halvings_for(double begin, double h) const;
   SimulationReport step_once(double h);
-  void set_bones(const PosedFrames& posed, lattice::Points& x) const;
+  StageProblem stage(const lattice::Points& x_h, const lattice::Points& v_h, const StagePoses& poses,
+                     double h, bool use_past) const;
+  SimulationReport failed(const SolveReport& solve) const;
   bool check(SimulationReport& report) const;
 
   const Body& body_;
   Motion motion_;
   SimulationOptions options_;
   std::function<bool()> should_stop_;
-  BlendedSolver solver_;
+  const ModelInfo* info_;
+  std::unique_ptr<Model> model_;
   double start_ = 0.0;
   State state_, before_;     ///< now and one step earlier, for sampling.
   PosedFrames now_, past_;   ///< their poses.

@@ -145,6 +145,7 @@ fem::SimulationOptions simulation_options(const Scene& scene) {
   options.step = scene.step;
   options.integrator =
       scene.integrator == Integrator::Bdf2 ? fem::Integrator::Bdf2 : fem::Integrator::BackwardEuler;
+  options.model = scene.model;
   options.solver.precision =
       scene.precision == Precision::Double ? fem::Precision::Double : fem::Precision::Float;
   // On uniform levels the hats of the finest level span the same space as the hierarchical basis with fewer

@@ -60,12 +60,6 @@ std::string print_material(const BoneMaterial& material) {
   return text;
 }
 
-/// What a printed scene says about the key.
-std::string comment(const SceneField& field) {
-  return field.symbol.empty() ? std::string(field.help)
-                              : fmt::format("{}; {}", field.help, range_text(field));
-}
-
 }  // namespace
 
 void Scene::validate() const {
@@ -86,7 +80,7 @@ std::string print_scene(const Scene& scene) {
   for (const SceneField& field : scene_fields()) {
     const std::string value = toml_value(scene, field);
     text += fmt::format(
-        "\n# {}\n{}", comment(field),
+        "\n# {}\n{}", help_text(field),
         value.empty() ? fmt::format("# {} =\n", field.key) : fmt::format("{} = {}\n", field.key, value));
   }
   for (const BoneMaterial& material : scene.materials) text += print_material(material);

@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "fem/models/model.h"
+
 /// What one run of `sinew simulate` is asked to do: every flag of the command and every key of a scene file.
 namespace sinew::tools {
 
@@ -78,6 +80,8 @@ struct Scene {
   /// Time step [s]; 1e-6 ... 0.1. Belongs to the scene, not to the frame rate: the held pose depends on it
   /// slightly.
   double step = 1.0 / 120.0;
+  /// Rung of the ladder: a name of the registry of models.
+  std::string model{fem::kDefaultModel};
   Integrator integrator = Integrator::Bdf2;
   /// Float factors solve faster, with a relative error near 3e-7.
   Precision precision = Precision::Double;

@@ -64,6 +64,7 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"output_space", &Scene::output_space, "units and axes of the output: file (the input's) or si"},
     {"gravity", &Scene::gravity, "gravity, Y up", "each component", {-1e4, 1e4}, "m/s^2", "0,-9.81,0"},
     {"step", &Scene::step, "time step", "h", {1e-6, 0.1}, "s", "1/120"},
+    {"model", ModelMember{&Scene::model}, "model of the flesh, from the cheapest to the most exact"},
     {"integrator", &Scene::integrator, "bdf2 or backward-euler (more damped, cannot fail)"},
     {"precision", &Scene::precision, "of the factors: double, or float (faster, relative error near 3e-7)"},
     {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
@@ -89,6 +90,12 @@ constexpr auto kFields = std::to_array<SceneField>({
 const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
 const std::vector<std::string> kPrecisionNames{"double", "float"};          // in the enum's order
 const std::vector<std::string> kOutputSpaceNames{"file", "si"};             // in the enum's order
+
+std::vector<std::string> model_names() {
+  std::vector<std::string> names;
+  for (const fem::ModelInfo& model : fem::models()) names.emplace_back(model.name);
+  return names;
+}
 
 /// A finite or infinite number, all of the text; nullopt for anything else, overflow included.
 std::optional<double> parse_double(std::string_view text) {
@@ -137,6 +144,15 @@ Enum parse_choice(const std::vector<std::string>& names, std::string_view text, 
   const std::string guess = nearest(text, names);
   throw ConfigError(fmt::format("{}: got '{}', expected {}; hint: {}", where, text, fmt::join(names, " or "),
                                 guess.empty() ? names.front() : guess));
+}
+
+void check_model(const std::string& name, const std::string& where) {
+  if (fem::find_model(name) != nullptr) return;
+  const std::vector<std::string> names = model_names();
+  const std::string guess = nearest(name, names);
+  throw ConfigError(fmt::format("{}: got '{}', expected one of {}; hint: {}", where, name,
+                                fmt::join(names, ", "),
+                                guess.empty() ? std::string(fem::kDefaultModel) : guess));
 }
 
 FrameRange parse_frames(std::string_view text, const std::string& where) {
@@ -222,6 +238,13 @@ std::string flag_name(const SceneField& field) {
   return name;
 }
 
+std::string help_text(const SceneField& field) {
+  if (std::holds_alternative<ModelMember>(field.member))
+    return fmt::format("{}: {}", field.help, fmt::join(model_names(), ", "));
+  return field.symbol.empty() ? std::string(field.help)
+                              : fmt::format("{}; {}", field.help, range_text(field));
+}
+
 std::string range_text(const SceneField& field) {
   // Long rows of zeros are hard to count.
   const auto text = [](double limit) {
@@ -243,6 +266,7 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
           [](bool Scene::*) {},
           [](std::string Scene::*) {},
           [](PathMember) {},
+          [&](ModelMember member) { check_model(scene.*(member.name), where); },
           [](Integrator Scene::*) {},
           [](Precision Scene::*) {},
           [](OutputSpace Scene::*) {},
@@ -275,6 +299,7 @@ void set_from_text(Scene& scene, const SceneField& field, std::string_view text,
                  [&](bool Scene::*member) { scene.*member = true; },
                  [&](std::string Scene::*member) { scene.*member = text; },
                  [&](PathMember member) { scene.*(member.path) = text; },
+                 [&](ModelMember member) { scene.*(member.name) = text; },
                  [&](int Scene::*member) {
                    const auto value = parse_int(text);
                    if (!value) refuse(field, quoted(text), "a whole number, " + range_text(field), where);
@@ -307,6 +332,7 @@ std::string flag_text(const Scene& scene, const SceneField& field) {
           [&](bool Scene::*member) { return std::string(scene.*member ? "true" : "false"); },
           [&](std::string Scene::*member) { return scene.*member; },
           [&](PathMember member) { return scene.*(member.path); },
+          [&](ModelMember member) { return scene.*(member.name); },
           [&](int Scene::*member) { return fmt::format("{}", scene.*member); },
           [&](double Scene::*member) { return number_text(scene.*member); },
           [&](std::optional<double> Scene::*member) {

@@ -17,8 +17,13 @@ struct PathMember {
   std::string Scene::*path;
 };
 
+/// The name of a model of the flesh (fem/models/model.h).
+struct ModelMember {
+  std::string Scene::*name;
+};
+
 using SceneMember = std::variant<bool Scene::*, int Scene::*, double Scene::*, std::optional<double> Scene::*,
-                                 std::string Scene::*, PathMember, Eigen::Vector3d Scene::*,
+                                 std::string Scene::*, PathMember, ModelMember, Eigen::Vector3d Scene::*,
                                  std::optional<FrameRange> Scene::*, Integrator Scene::*, Precision Scene::*,
                                  OutputSpace Scene::*>;
 
@@ -52,6 +57,9 @@ const SceneField* find_scene_field(std::string_view key);
 
 /// "damping_frequency" -> "--damping-frequency".
 std::string flag_name(const SceneField& field);
+
+/// For --help and the comment in a printed scene: what it is, the names or the range allowed.
+std::string help_text(const SceneField& field);
 
 /// "-1 < nu < 0.5", "1e-06 <= h <= 0.1 s".
 std::string range_text(const SceneField& field);

@@ -23,10 +23,9 @@ bool is_scene_file(const std::string& file) {
   return extension == ".toml";
 }
 
-std::string help_text(const SceneField& field) {
-  const std::string range = field.symbol.empty() ? "" : fmt::format("; {}", range_text(field));
+std::string help_with_default(const SceneField& field) {
   const std::string value = flag_text(Scene{}, field);
-  return fmt::format("{}{}{}", field.help, range, value.empty() ? "" : fmt::format(" [{}]", value));
+  return value.empty() ? help_text(field) : fmt::format("{} [{}]", help_text(field), value);
 }
 
 /// What stands for the value in --help.
@@ -52,7 +51,7 @@ void SimulateOptions::add_to(CLI::App& command) {
     if (std::holds_alternative<bool Scene::*>(field.member)) {
       command.add_flag(name, switches_[key], std::string(field.help));
     } else {
-      command.add_option(name, flags_[key], help_text(field))->type_name(placeholder(field));
+      command.add_option(name, flags_[key], help_with_default(field))->type_name(placeholder(field));
     }
   }
   command.add_flag("--print-scene", print_scene_only_, "print the whole scene in force as TOML and stop");

@@ -9,11 +9,19 @@
 #include <gtest/gtest.h>
 
 #include "assets/error.h"
+#include "fem/models/model.h"
 #include "tests/comma_locale.h"
 #include "tools/scene_fields.h"
 
 namespace sinew::tools {
 namespace {
+
+/// The names that a message lists; the registry grows.
+std::string model_list() {
+  std::string list;
+  for (const fem::ModelInfo& model : fem::models()) list.append(list.empty() ? "" : ", ").append(model.name);
+  return list;
+}
 
 namespace fs = std::filesystem;
 
@@ -71,6 +79,7 @@ output_space = "si"
 gravity = [0, 0, -9.81]
 step = "1/240"
 integrator = "backward-euler"
+model = "skin"
 precision = "float"
 fps = 23.976
 frames = "3-47"
@@ -106,6 +115,7 @@ density = 900
   expected.gravity = {0.0, 0.0, -9.81};
   expected.step = 1.0 / 240.0;
   expected.integrator = Integrator::BackwardEuler;
+  expected.model = "skin";
   expected.precision = Precision::Float;
   expected.fps = 23.976;
   expected.frames = FrameRange{3, 47};
@@ -128,7 +138,7 @@ TEST_F(SceneFile, TakesPathsRelativeToItself) {
 TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
   struct Case {
     const char* text;
-    const char* message;
+    std::string message;
   };
   const Case cases[] = {
       {"poisson = 0.5", "scene.toml:1: poisson: got 0.5, expected -1 < nu < 0.5; hint: 0.49"},
@@ -160,6 +170,10 @@ TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
        "scene.toml:1: frames: got 'first', expected A-B, two frame numbers; hint: 0-47"},
       {"integrator = \"bdf3\"",
        "scene.toml:1: integrator: got 'bdf3', expected bdf2 or backward-euler; hint: bdf2"},
+      {"model = \"blendde\"",
+       "scene.toml:1: model: got 'blendde', expected one of " + model_list() + "; hint: blended"},
+      {"model = \"magic\"",
+       "scene.toml:1: model: got 'magic', expected one of " + model_list() + "; hint: blended"},
       {"clip = 3", "scene.toml:1: clip: got a whole number, expected a string"},
       {"overwrite = 1", "scene.toml:1: overwrite: got a whole number, expected true or false"},
       {"rig = \"a.glb\"\ndampnig = 0.1", "scene.toml:2: dampnig: unknown key; hint: did you mean damping?"},
@@ -260,6 +274,7 @@ Scene random_scene(std::mt19937_64& rng) {
   scene.gravity = {unit(), -10.0 * unit(), 1e-7 * unit()};
   scene.step = 1e-6 + 0.09 * unit();
   scene.integrator = index(2) == 1 ? Integrator::BackwardEuler : Integrator::Bdf2;
+  if (index(2) == 1) scene.model = "skin";
   scene.precision = index(2) == 1 ? Precision::Float : Precision::Double;
   scene.fps = 1.0 + 100.0 * unit();
   if (index(2) == 1) scene.frames = FrameRange{index(10), 10 + index(10)};

@@ -10,10 +10,18 @@
 #include <gtest/gtest.h>
 
 #include "assets/error.h"
+#include "fem/models/model.h"
 #include "tools/scene_fields.h"
 
 namespace sinew::tools {
 namespace {
+
+/// The names that a message lists; the registry grows.
+std::string model_list() {
+  std::string list;
+  for (const fem::ModelInfo& model : fem::models()) list.append(list.empty() ? "" : ", ").append(model.name);
+  return list;
+}
 
 Scene parse(std::vector<std::string> arguments) {
   CLI::App app;
@@ -84,6 +92,8 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
                              "24000/1001",
                              "--integrator",
                              "backward-euler",
+                             "--model",
+                             "skin",
                              "--precision",
                              "float",
                              "--frames",
@@ -111,6 +121,7 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
   EXPECT_EQ(scene.step, 1.0 / 240.0);
   EXPECT_EQ(scene.fps, 24000.0 / 1001.0);
   EXPECT_EQ(scene.integrator, Integrator::BackwardEuler);
+  EXPECT_EQ(scene.model, "skin");
   EXPECT_EQ(scene.precision, Precision::Float);
   EXPECT_EQ(scene.frames, (FrameRange{0, 47}));
   EXPECT_EQ(scene.settle, 0.5);
@@ -136,7 +147,7 @@ TEST(SimulateOptions, RefuseWithFlagValueRangeAndHint) {
   struct Case {
     const char* flag;
     const char* value;
-    const char* message;
+    std::string message;
   };
   const Case cases[] = {
       {"--poisson", "0.5", "--poisson: got 0.5, expected -1 < nu < 0.5; hint: 0.49"},
@@ -173,6 +184,7 @@ TEST(SimulateOptions, RefuseWithFlagValueRangeAndHint) {
       {"--frames", "7-3", "--frames: got 7-3, expected A-B with 0 <= A <= B <= 10000000; hint: 0-47"},
       {"--frames", "-3-7", "--frames: got -3-7, expected A-B with 0 <= A <= B <= 10000000; hint: 0-47"},
       {"--integrator", "bfd2", "--integrator: got 'bfd2', expected bdf2 or backward-euler; hint: bdf2"},
+      {"--model", "skni", "--model: got 'skni', expected one of " + model_list() + "; hint: skin"},
       {"--output-space", "metres", "--output-space: got 'metres', expected file or si; hint: file"},
   };
   for (const auto& [flag, value, message] : cases) {

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fem/body.h"
+#include "fem/integrator.h"
+#include "fem/state.h"
+
+/// The ladder: models of the flesh from skinning to full nonlinear elasticity behind one interface. All of
+/// them move the same State along the same poses; the time loop (fem/simulation.h) does not know which one it
+/// steps. Adding a model takes a file pair in this folder and one line in registry.cpp.
+namespace sinew::fem {
+
+/// Why a solve ended. Everything but Ok leaves the caller's state as it was.
+enum class SolveStatus {
+  Ok,
+  NotPositiveDefinite,  ///< no factor, and no fallback helped.
+  NoConvergence,        ///< iterations ran out or no step made progress: a smaller time step may help.
+};
+
+/// What a model did; `message` is one sentence that names the place.
+struct [[nodiscard]] SolveReport {
+  SolveStatus status = SolveStatus::Ok;
+  int iterations = 0;     ///< of the outermost loop; 0 for one direct solve.
+  double residual = 0.0;  ///< left over, relative to the forces that balance [-].
+  int cell = -1;          ///< leaf cell with the largest residual or the most inverted; -1 where ok.
+  std::string message;
+
+  bool ok() const { return status == SolveStatus::Ok; }
+};
+
+/// One implicit stage, x+ = x_h + eta h v+ (fem/integrator.h), about to be solved for v+.
+struct StageProblem {
+  const State* state = nullptr;          ///< at the step's begin.
+  const lattice::Points* x_h = nullptr;  ///< stage predictor of positions, num_vertices x 3 [m].
+  const lattice::Points* v_h = nullptr;  ///< stage predictor of velocities [m/s].
+  StagePoses poses;
+  double h = 0.0;  ///< step [s].
+  Integrator integrator = Integrator::Bdf2;
+  Eigen::Vector3d gravity{0, 0, 0};  ///< [m/s^2].
+  bool use_past = false;             ///< histories reach back to state->x_past; else the present alone.
+};
+
+class Model {
+ public:
+  virtual ~Model() = default;
+
+  /// Makes what stages of step h [s] need; cheap where it is there already.
+  virtual SolveReport prepare(double h, Integrator integrator) = 0;
+
+  /// v+ [m/s] of all leaf vertices at the end of the stage; those on bones get the velocity that puts them on
+  /// the clip. prepare(h, integrator) must have succeeded. `velocity` is untouched unless the report is ok.
+  virtual SolveReport solve_stage(const StageProblem& problem, lattice::Points& velocity) = 0;
+
+  virtual SolverCounts counts() const = 0;
+};
+
+/// A line of the registry.
+struct ModelInfo {
+  std::string_view name;         ///< as flags and scenes write it.
+  std::string_view description;  ///< one line.
+  /// False: flesh has no inertia and stands at every instant where the pose alone puts it.
+  bool dynamic = true;
+  std::unique_ptr<Model> (*make)(const Body& body, const SolverOptions& options) = nullptr;
+};
+
+/// All models, cheapest first.
+std::span<const ModelInfo> models();
+
+/// nullptr where there is none of that name.
+const ModelInfo* find_model(std::string_view name);
+
+/// The name of the model that is used unless another one is asked for.
+inline constexpr std::string_view kDefaultModel = "blended";
+
+}  // namespace sinew::fem

@@ -1,0 +1,36 @@
+#include "fem/models/skin.h"
+
+#include "fem/placement.h"
+
+namespace sinew::fem {
+namespace {
+
+class Skin final : public Model {
+ public:
+  explicit Skin(const Body& body) : body_(body) {}
+
+  SolveReport prepare(double, Integrator) override { return {}; }
+
+  SolveReport solve_stage(const StageProblem& p, lattice::Points& velocity) override {
+    const double eta_h = stage_of(p.integrator).eta * p.h;
+    velocity = (skinned_positions(body_, *p.poses.stage) - *p.x_h) / eta_h;
+    return {};
+  }
+
+  SolverCounts counts() const override {
+    SolverCounts counts;
+    counts.functions = body_.mesh.num_functions();
+    return counts;
+  }
+
+ private:
+  const Body& body_;
+};
+
+}  // namespace
+
+std::unique_ptr<Model> make_skin(const Body& body, const SolverOptions&) {
+  return std::make_unique<Skin>(body);
+}
+
+}  // namespace sinew::fem

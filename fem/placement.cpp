@@ -1,0 +1,46 @@
+#include "fem/placement.h"
+
+#include <algorithm>
+
+namespace sinew::fem {
+
+using lattice::Points;
+
+Points skinned_frames(const Body& body, const PosedFrames& posed) {
+  Points x = Points::Zero(body.mesh.num_vertices(), 3);
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+      sum += it.value() * (posed.frames[static_cast<std::size_t>(it.col())].from_rest *
+                           body.mesh.points.row(a).transpose());
+    }
+    x.row(a) = sum.transpose();
+  }
+  return x;
+}
+
+void place_bones(const Body& body, const PosedFrames& posed, Points& x) {
+  for (const BoneVertex& bone : body.bones.vertices)
+    x.row(bone.vertex) = bone_position(bone, posed.joints).transpose();
+}
+
+void fill_inactive_leaves(const Body& body, Points& x) {
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    const int vertex = body.mesh.vertices[static_cast<std::size_t>(a)];
+    if (body.hierarchy.level(vertex) == 0) continue;
+    if (std::binary_search(body.mesh.functions.begin(), body.mesh.functions.end(), vertex)) continue;
+    Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
+    const auto parents = body.hierarchy.parents(vertex);
+    for (int p : parents) mean += x.row(body.mesh.leaf_of_vertex[static_cast<std::size_t>(p)]);
+    x.row(a) = mean / static_cast<double>(parents.size());
+  }
+}
+
+Points skinned_positions(const Body& body, const PosedFrames& posed) {
+  Points x = skinned_frames(body, posed);
+  place_bones(body, posed, x);
+  fill_inactive_leaves(body, x);
+  return x;
+}
+
+}  // namespace sinew::fem

@@ -1,0 +1,109 @@
+#include <set>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "fem/simulation.h"
+#include "tests/fem/arm.h"
+
+namespace sinew::fem {
+namespace {
+
+using lattice::Points;
+using tests::kDegree;
+
+std::vector<Eigen::Affine3d> waving(double time) {
+  Eigen::Affine3d base(Eigen::AngleAxisd(0.7 * time, Eigen::Vector3d(0.0, 0.6, 0.8)));
+  base.pretranslate(Eigen::Vector3d(0.3 * time, -0.2, 5.0 * time * time));
+  return tests::arm_pose(60.0 * kDegree * std::sin(9.0 * time), base, 0.5 * std::sin(5.0 * time));
+}
+
+TEST(Models, HaveOneNameAndOneLineEach) {
+  std::set<std::string_view> names;
+  for (const ModelInfo& model : models()) {
+    EXPECT_TRUE(names.insert(model.name).second) << model.name;
+    EXPECT_EQ(find_model(model.name), &model);
+    EXPECT_FALSE(model.description.empty());
+    EXPECT_EQ(model.description.find('\n'), std::string_view::npos);
+  }
+  EXPECT_NE(find_model(kDefaultModel), nullptr);
+  EXPECT_EQ(find_model("magic"), nullptr);
+  EXPECT_EQ(find_model(""), nullptr);
+}
+
+TEST(Models, AreRefusedByTheSimulationWhereTheyAreUnknown) {
+  SimulationOptions options;
+  options.model = "magic";
+  try {
+    options.validate();
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_EQ(std::string(error.what()).substr(0, 38), "model: got magic, expected one of skin");
+  }
+}
+
+// Every model moves as a rigid body where its bones do, at any speed and far from the origin, and keeps bone
+// vertices on the clip while they bend.
+TEST(Models, KeepBoneVerticesOnTheClip) {
+  const tests::Arm arm = tests::make_arm();
+  const Body body = tests::arm_body(arm, 60 * kDegree);
+  for (const ModelInfo& model : models()) {
+    SimulationOptions options;
+    options.model = model.name;
+    Simulation simulation(body, waving, 0.0, options);
+    ASSERT_EQ(simulation.settle().status, SimulationStatus::Ok) << model.name;
+    for (double time : {0.021, 0.093}) {  // never at the end of a step
+      ASSERT_EQ(simulation.advance_to(time).status, SimulationStatus::Ok) << model.name;
+      // Positions are of size 1, and each is a sum of a few dozen rounded products.
+      EXPECT_LE(simulation.measures_at(time).bone_residual, 1e-13) << model.name;
+    }
+  }
+}
+
+// s_f T_f X, summed here by hand from the weights.
+TEST(Skin, PutsTheLatticeWhereTheWeightsSay) {
+  const tests::Arm arm = tests::make_arm(lattice::CellType::Wedge);
+  const Body body = tests::arm_body(arm, 60 * kDegree);
+  SimulationOptions options;
+  options.model = "skin";
+  Simulation simulation(body, waving, 0.0, options);
+  EXPECT_EQ(simulation.settle().steps, 0);
+  for (double time : {0.0, 0.05, 0.3123, 0.5}) {
+    ASSERT_EQ(simulation.advance_to(time).status, SimulationStatus::Ok);
+    const Points x = simulation.positions_at(time);
+    const auto pose = waving(time);
+    int checked = 0;
+    for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+      // Inside a lattice edge a vertex stands at the mean of its ends, which is the same where both have the
+      // same weights; level-0 vertices have weights of their own.
+      if (body.hierarchy.level(body.mesh.vertices[static_cast<std::size_t>(a)]) > 0) continue;
+      if (body.bones.is_bone[static_cast<std::size_t>(a)]) continue;
+      Eigen::Vector3d expected = Eigen::Vector3d::Zero();
+      for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+        const auto joint =
+            static_cast<std::size_t>(body.tree.frames[static_cast<std::size_t>(it.col())].joint);
+        expected += it.value() * (pose[joint] * body.mesh.points.row(a).transpose());
+      }
+      EXPECT_LE((x.row(a).transpose() - expected).norm(), 1e-13);
+      ++checked;
+    }
+    EXPECT_GT(checked, 50);
+  }
+}
+
+TEST(Skin, StandsWhereThePoseIsWhateverCameBefore) {
+  const tests::Arm arm = tests::make_arm();
+  const Body body = tests::arm_body(arm, 60 * kDegree);
+  SimulationOptions coarse, fine;
+  coarse.model = fine.model = "skin";
+  coarse.step = 1.0 / 7.0;
+  Simulation a(body, waving, 0.0, coarse), b(body, waving, 0.4, fine);
+  for (double time : {0.5, 0.61}) {
+    ASSERT_EQ(a.advance_to(time).status, SimulationStatus::Ok);
+    ASSERT_EQ(b.advance_to(time).status, SimulationStatus::Ok);
+    EXPECT_LE((a.positions_at(time) - b.positions_at(time)).rowwise().norm().maxCoeff(), 1e-14);
+  }
+}
+
+}  // namespace
+}  // namespace sinew::fem
