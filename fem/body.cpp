@@ -106,6 +106,34 @@ void check_input(const BodyInput& input) {
   }
 }
 
+/// Joints that are frames besides those of bones and soft frames.
+std::vector<int> further_frames(const BodyInput& input) {
+  std::vector<int> joints = input.bare_frames;
+  for (const HeldPlane& plane : input.held) joints.push_back(plane.joint);
+  return joints;
+}
+
+/// Adds the leaf vertices on the planes to those on the bones; a vertex that a bone holds stays the bone's.
+void hold_planes(const std::vector<HeldPlane>& planes, const FrameTree& tree, const lattice::LeafMesh& mesh,
+                 BoneConstraints& bones) {
+  if (planes.empty()) return;
+  const double size = (mesh.points.colwise().maxCoeff() - mesh.points.colwise().minCoeff()).norm();
+  const double tolerance = 1e-9 * size;  // of vertex means: a few roundings of coordinates of this size
+  for (int a = 0; a < mesh.num_vertices(); ++a) {
+    const Eigen::Vector3d x = mesh.points.row(a).transpose();
+    for (const HeldPlane& plane : planes) {
+      if (bones.is_bone[static_cast<std::size_t>(a)] ||
+          std::abs((x - plane.point).dot(plane.normal)) > tolerance)
+        continue;
+      bones.is_bone[static_cast<std::size_t>(a)] = 1;
+      const int frame = tree.frame_of_joint[static_cast<std::size_t>(plane.joint)];
+      bones.vertices.push_back({a, frame, -1, plane.joint, plane.joint, x, x, 0.0});
+    }
+  }
+  std::sort(bones.vertices.begin(), bones.vertices.end(),
+            [](const BoneVertex& a, const BoneVertex& b) { return a.vertex < b.vertex; });
+}
+
 }  // namespace
 
 void BodyOptions::validate() const {
@@ -154,8 +182,9 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   mesh = lattice::restrict_cells(hierarchy, mesh, keep);
   skin = lattice::embed(mesh, input.skin.points);
 
-  FrameTree tree = frame_tree(input.lattice, input.skeleton);
+  FrameTree tree = frame_tree(input.lattice, input.skeleton, further_frames(input));
   BoneConstraints bones = bone_constraints(input.lattice, tree, hierarchy, mesh);
+  hold_planes(input.held, tree, mesh, bones);
   FrameWeights weights = frame_weights(hierarchy, mesh, skin, input.skin, tree, bones);
 
   const std::vector<Material> of_frame = frame_materials(tree, options);

@@ -54,6 +54,13 @@ struct Body {
   double size = 0.0;                ///< diagonal of the lattice's box [m].
 };
 
+/// A plane of the rest shape on which every leaf vertex is held: a clamped end.
+struct HeldPlane {
+  int joint = -1;                   ///< joint of the skeleton that it moves with; it becomes a frame.
+  Eigen::Vector3d point{0, 0, 0};   ///< on the plane [m].
+  Eigen::Vector3d normal{1, 0, 0};  ///< unit.
+};
+
 /// Everything that make_body is given besides the options. `poses`: poses of the clip (pose_from_rest of
 /// every joint), for judging how far joints bend; at least one.
 struct BodyInput {
@@ -61,6 +68,11 @@ struct BodyInput {
   const lattice::Surface& skin;
   const skeleton::Skeleton& skeleton;
   const std::vector<std::vector<Eigen::Affine3d>>& poses;
+  /// Planes held besides the bones.
+  std::vector<HeldPlane> held = {};
+  /// Joints that are frames though nothing of theirs is in the lattice: what is linearised in one needs
+  /// neither bone nor tie.
+  std::vector<int> bare_frames = {};
 };
 
 /// Throws std::invalid_argument where a cell is inverted, no cell holds flesh, the skin has no weights or

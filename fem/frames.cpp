@@ -8,7 +8,8 @@
 
 namespace sinew::fem {
 
-FrameTree frame_tree(const lattice::ControlLattice& lattice, const skeleton::Skeleton& skeleton) {
+FrameTree frame_tree(const lattice::ControlLattice& lattice, const skeleton::Skeleton& skeleton,
+                     const std::vector<int>& further) {
   const int num_joints = skeleton.num_joints();
   std::map<int, Frame> by_joint;  // ascending joint index: parents come first
   const auto frame_at = [&](int joint) -> Frame& {
@@ -32,6 +33,11 @@ FrameTree frame_tree(const lattice::ControlLattice& lattice, const skeleton::Ske
     Frame& frame = frame_at(soft.frame);
     if (frame.joint < 0) frame.origin_rest = soft.position;
     frame.joint = soft.frame;
+  }
+  for (const int joint : further) {
+    Frame& frame = frame_at(joint);
+    if (frame.joint < 0) frame.origin_rest = skeleton.joint(joint).rest_from_joint.translation();
+    frame.joint = joint;
   }
   if (by_joint.empty()) throw std::invalid_argument("the lattice has neither a bone nor a soft frame");
 

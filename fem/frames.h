@@ -31,9 +31,11 @@ struct FrameTree {
   int num_frames() const { return static_cast<int>(frames.size()); }
 };
 
-/// Throws std::invalid_argument where the lattice has neither a bone nor a soft frame, or names a joint that
-/// the skeleton does not have.
-FrameTree frame_tree(const lattice::ControlLattice& lattice, const skeleton::Skeleton& skeleton);
+/// `further`: joints that are frames whatever the lattice says. Throws std::invalid_argument where the
+/// lattice has neither a bone nor a soft frame and there is no further one, or a joint is named that the
+/// skeleton does not have.
+FrameTree frame_tree(const lattice::ControlLattice& lattice, const skeleton::Skeleton& skeleton,
+                     const std::vector<int>& further = {});
 
 /// T_f and R_f of one frame at one instant.
 struct FrameTransform {

@@ -10,6 +10,7 @@
 #include "assets/lattice_files.h"
 #include "fem/default_material.h"
 #include "tools/failure.h"
+#include "tools/plain_character.h"
 
 namespace sinew::tools {
 namespace {
@@ -52,26 +53,32 @@ std::vector<std::vector<Eigen::Affine3d>> sample_poses(const Character& c) {
   return poses;
 }
 
+fem::DefaultMaterials default_materials(const Scene& scene, const Character& c) {
+  // The sag rule speaks of the gravity that the flesh is built for: the Earth's where the scene has none.
+  constexpr double kEarth = 9.81;
+  const std::vector<std::vector<Eigen::Affine3d>> poses = sample_poses(c);
+  return fem::default_materials({c.lattice.lattice, c.input.skin.surface, c.rig.skeleton, poses, kPoseSpacing,
+                                 scene.density, scene.poisson,
+                                 scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth});
+}
+
 /// The scene's materials: E by the scene or by default, then what the scene says of single bones.
 void settle_materials(const Scene& scene, Character& c) {
   fem::BodyOptions& body = c.body_options;
   const lattice::ControlLattice& lattice = c.lattice.lattice;
-  // The sag rule speaks of the gravity that the flesh is built for: the Earth's where the scene has none.
-  constexpr double kEarth = 9.81;
-  const std::vector<std::vector<Eigen::Affine3d>> poses = sample_poses(c);
-  const fem::DefaultMaterials defaults = fem::default_materials(
-      {lattice, c.input.skin.surface, c.rig.skeleton, poses, kPoseSpacing, scene.density, scene.poisson,
-       scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth});
-  c.limb_thickness = defaults.thickness;
-  body.material = defaults.base;
+  if (!scene.plain) {
+    const fem::DefaultMaterials defaults = default_materials(scene, c);
+    c.limb_thickness = defaults.thickness;
+    body.material = defaults.base;
+    body.materials = defaults.of_joints;
+  }
   if (scene.young) {
     body.material.young = *scene.young;
-  } else {
-    body.materials = defaults.of_joints;
+    body.materials.clear();
   }
   std::vector<std::string> names;
   for (const auto& bone : lattice.bones) names.push_back(bone.name);
-  const std::vector<int> chosen = material_of_bone(scene, scene.rig, names);
+  const std::vector<int> chosen = material_of_bone(scene, c.rig.file, names);
   for (std::size_t b = 0; b < lattice.bones.size(); ++b) {
     if (chosen[b] < 0) continue;
     const int joint = lattice.bones[b].frame;
@@ -93,8 +100,9 @@ std::vector<Eigen::Affine3d> Character::pose(double time) const {
   return skeleton::pose_from_rest(rig.skeleton, skeleton::sample(rig.skeleton, the_clip(), time));
 }
 
-Character make_character(const Scene& scene, const Talk& talk) {
-  Character c;
+namespace {
+
+void load_rig(const Scene& scene, const Talk& talk, Character& c) {
   {
     const Phase phase(c.times, "load");
     assets::LoadOptions options;
@@ -119,7 +127,28 @@ Character make_character(const Scene& scene, const Talk& talk) {
     }
   }
   report_lattice(scene, c.lattice, talk);
+}
 
+void load_plain(const Scene& scene, Character& c) {
+  const Phase phase(c.times, "lattice");
+  PlainCharacter plain = make_plain_character(scene);
+  c.rig = std::move(plain.rig);
+  c.clip = 0;
+  c.input = std::move(plain.input);
+  c.lattice.lattice = std::move(plain.lattice);
+  c.held = std::move(plain.held);
+  c.bare_frames = std::move(plain.bare_frames);
+}
+
+}  // namespace
+
+Character make_character(const Scene& scene, const Talk& talk) {
+  Character c;
+  if (scene.plain) {
+    load_plain(scene, c);
+  } else {
+    load_rig(scene, talk, c);
+  }
   fem::BodyOptions& body = c.body_options;
   body.levels = scene.levels;
   body.material.poisson = scene.poisson;
@@ -132,9 +161,9 @@ Character make_character(const Scene& scene, const Talk& talk) {
 fem::Body make_body(const Character& character) {
   const std::vector<std::vector<Eigen::Affine3d>> poses = sample_poses(character);
   try {
-    return fem::make_body(
-        {character.lattice.lattice, character.input.skin.surface, character.rig.skeleton, poses},
-        character.body_options);
+    return fem::make_body({character.lattice.lattice, character.input.skin.surface, character.rig.skeleton,
+                           poses, character.held, character.bare_frames},
+                          character.body_options);
   } catch (const std::invalid_argument& error) {
     throw assets::InputError(character.rig.file, error.what());
   }

@@ -19,11 +19,13 @@ using PhaseTimes = std::vector<std::pair<std::string, double>>;
 /// Everything a run needs, in the rig's space (SI, Y up).
 struct Character {
   assets::Rig rig;
-  int clip = -1;                  ///< index into rig.clips.
-  assets::LatticeInput input;     ///< welded skin and joints.
-  lattice::BuildResult lattice;   ///< built, or read from the scene's lattice file.
-  fem::BodyOptions body_options;  ///< materials and damping in force.
-  double limb_thickness = 0.0;    ///< t of the default stiffness [m].
+  int clip = -1;                     ///< index into rig.clips.
+  assets::LatticeInput input;        ///< welded skin and joints.
+  lattice::BuildResult lattice;      ///< built, or read from the scene's lattice file.
+  fem::BodyOptions body_options;     ///< materials and damping in force.
+  std::vector<fem::HeldPlane> held;  ///< of a plain scene.
+  std::vector<int> bare_frames;      ///< of a plain scene that nothing holds.
+  double limb_thickness = 0.0;       ///< t of the default stiffness [m].
   PhaseTimes times;
 
   const skeleton::Clip& the_clip() const { return rig.clips[static_cast<std::size_t>(clip)]; }

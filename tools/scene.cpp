@@ -7,6 +7,7 @@
 
 #include "assets/error.h"
 #include "tools/scene_fields.h"
+#include "tools/toml_text.h"
 
 namespace sinew::tools {
 namespace {
@@ -41,14 +42,8 @@ bool matches(std::string_view pattern, std::string_view name) {
 }
 
 std::string toml_strings(const std::vector<std::string>& texts) {
-  // Bone names come through the same writer as the other strings: one place knows how TOML quotes.
-  static const SceneField& field = *find_scene_field("clip");
   std::string list;
-  for (const std::string& text : texts) {
-    Scene scratch;
-    scratch.clip = text;
-    list += (list.empty() ? "" : ", ") + toml_value(scratch, field);
-  }
+  for (const std::string& text : texts) list += (list.empty() ? "" : ", ") + toml_quoted(text, "bones");
   return "[" + list + "]";
 }
 
@@ -60,10 +55,35 @@ std::string print_material(const BoneMaterial& material) {
   return text;
 }
 
+/// Keys that say something about a rig; a plain scene has none of them.
+bool is_of_characters(std::string_view key) {
+  constexpr std::string_view kKeys[] = {"rig",    "clip",         "lattice",    "cells",
+                                        "height", "output_space", "output_mesh"};
+  return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
+}
+
+void check_plain(const Scene& scene) {
+  scene.plain->validate();
+  const Scene defaults;
+  for (const SceneField& field : scene_fields()) {
+    if (!is_of_characters(field.key) || flag_text(scene, field) == flag_text(defaults, field)) continue;
+    throw assets::ConfigError(
+        fmt::format("{}: got {}, expected nothing as the scene is a box without a rig; hint: "
+                    "[lattice] holds its size and its cells",
+                    field.key, flag_text(scene, field)));
+  }
+  if (!scene.young) {
+    throw assets::ConfigError(
+        "young: missing, expected Young's modulus in pascal as the scene is a box without a rig; "
+        "hint: young = 1e5");
+  }
+}
+
 }  // namespace
 
 void Scene::validate() const {
   for (const SceneField& field : scene_fields()) check_field(*this, field, std::string(field.key));
+  if (plain) check_plain(*this);
   for (std::size_t i = 0; i < materials.size(); ++i) {
     const std::string where = fmt::format("material {}", i + 1);
     if (materials[i].bones.empty())
@@ -78,11 +98,13 @@ void Scene::validate() const {
 std::string print_scene(const Scene& scene) {
   std::string text = "# Paths are relative to the directory of this file.\n";
   for (const SceneField& field : scene_fields()) {
+    if (scene.plain && is_of_characters(field.key)) continue;
     const std::string value = toml_value(scene, field);
     text += fmt::format(
         "\n# {}\n{}", help_text(field),
         value.empty() ? fmt::format("# {} =\n", field.key) : fmt::format("{} = {}\n", field.key, value));
   }
+  if (scene.plain) text += print_plain_scene(*scene.plain);
   for (const BoneMaterial& material : scene.materials) text += print_material(material);
   return text;
 }

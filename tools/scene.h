@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "fem/models/model.h"
+#include "tools/plain_scene.h"
 
 /// What one run of `sinew simulate` is asked to do: every flag of the command and every key of a scene file.
 namespace sinew::tools {
@@ -38,11 +39,22 @@ struct BoneMaterial {
   friend bool operator==(const BoneMaterial&, const BoneMaterial&) = default;
 };
 
+/// Where something was read from; no part of what it says.
+struct SourceFile {
+  std::string path;  ///< as the user gave it; empty: nowhere.
+
+  friend bool operator==(const SourceFile&, const SourceFile&) { return true; }
+};
+
 /// Built whole by read_scene or SimulateOptions, checked once by validate, then read only. Paths are relative
 /// to the current directory. Limits follow the range in which the method is tested.
 struct Scene {
-  /// The character; required for a run.
+  /// The scene file, where there is one.
+  SourceFile source;
+  /// The character; required for a run, unless the scene is a plain one.
   std::string rig;
+  /// A box of flesh with bones of its own instead of a character.
+  std::optional<PlainScene> plain;
   /// Where the results go; required for a run.
   std::string output;
   /// Replace a run that `output` holds already.

@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "assets/error.h"
-#include "tools/failure.h"
 #include "tools/suggest.h"
+#include "tools/toml_text.h"
 
 namespace sinew::tools {
 namespace {
@@ -194,25 +194,6 @@ std::string toml_number(const std::string& text) {
   return text.find('/') == std::string::npos ? text : '"' + text + '"';
 }
 
-std::string toml_string(const SceneField& field, const std::string& text) {
-  if (!is_utf8(text)) {
-    throw ConfigError(
-        fmt::format("{}: got '{}', expected UTF-8; hint: rename the file, TOML cannot hold the name",
-                    field.key, single_line(text)));
-  }
-  std::string literal = "\"";
-  for (const char letter : text) {
-    const auto byte = static_cast<unsigned char>(letter);
-    if (letter == '"' || letter == '\\') literal += '\\';
-    if (byte < 0x20 || byte == 0x7F) {
-      literal += fmt::format("\\u{:04X}", byte);
-    } else {
-      literal += letter;
-    }
-  }
-  return literal + '"';
-}
-
 }  // namespace
 
 std::optional<double> parse_number(std::string_view text) {
@@ -360,7 +341,7 @@ std::string toml_value(const Scene& scene, const SceneField& field) {
           [&](double Scene::*) { return toml_number(text); },
           [&](std::optional<double> Scene::*) { return toml_number(text); },
           [&](Eigen::Vector3d Scene::*member) { return fmt::format("[{}]", fmt::join(scene.*member, ", ")); },
-          [&](auto) { return toml_string(field, text); },
+          [&](auto) { return toml_quoted(text, field.key); },
       },
       field.member);
 }

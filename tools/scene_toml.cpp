@@ -9,12 +9,12 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include "assets/error.h"
+#include "tools/detail/plain_scene_toml.h"
+#include "tools/detail/toml_reader.h"
 #include "tools/scene.h"
 #include "tools/scene_fields.h"
-#include "tools/suggest.h"
 
 namespace sinew::tools {
 namespace {
@@ -44,37 +44,10 @@ std::string read_text(const std::string& file) {
   return text;
 }
 
-std::string type_name(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "an array";
-    case toml::node_type::string:
-      return "a string";
-    case toml::node_type::integer:
-      return "a whole number";
-    case toml::node_type::floating_point:
-      return "a number";
-    case toml::node_type::boolean:
-      return "a boolean";
-    default:
-      return "a date or time";
-  }
-}
-
-std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table) {
-  std::vector<std::pair<std::string, const toml::node*>> entries;
-  for (const auto& [key, node] : table) entries.emplace_back(std::string(key.str()), &node);
-  std::stable_sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) {
-    return a.second->source().begin < b.second->source().begin;
-  });
-  return entries;
-}
-
-class SceneReader {
+class SceneReader : public detail::TomlReader {
  public:
-  explicit SceneReader(const std::string& file) : file_(file), directory_(fs::path(file).parent_path()) {}
+  explicit SceneReader(const std::string& file)
+      : TomlReader(file), file_(file), directory_(fs::path(file).parent_path()) {}
 
   Scene read() {
     const std::string text = read_text(file_);
@@ -86,80 +59,60 @@ class SceneReader {
       throw ConfigError(
           fmt::format("{}:{}:{}: not valid TOML: {}", file_, place.line, place.column, e.description()));
     }
-    for (const auto& [key, node] : in_file_order(table)) {
-      if (key == "material") {
-        read_materials(*node);
-      } else {
-        read_field(key, *node);
-      }
-    }
+    for (const auto& [key, node] : detail::in_file_order(table)) read_entry(key, *node);
+    check_plain(table);
+    scene_.source.path = file_;
     return std::move(scene_);
   }
 
  private:
-  std::string place(const toml::node& node) const {
-    return fmt::format("{}:{}", file_, node.source().begin.line);
-  }
-
-  [[noreturn]] void refuse_type(const toml::node& node, const std::string& where,
-                                const std::string& expected) const {
-    throw ConfigError(fmt::format("{}: got {}, expected {}", where, type_name(node), expected));
-  }
-
-  [[noreturn]] void refuse_key(const std::string& key, const toml::node& node,
-                               const std::vector<std::string>& keys) const {
-    const std::string guess = nearest(key, keys);
-    throw ConfigError(fmt::format("{}: {}: unknown key; hint: {}", place(node), key,
-                                  guess.empty() ? fmt::format("known are {}", fmt::join(keys, ", "))
-                                                : fmt::format("did you mean {}?", guess)));
-  }
-
-  std::string string(const toml::node& node, const std::string& where) const {
-    const auto value = node.value_exact<std::string>();
-    if (!value) refuse_type(node, where, "a string");
-    return *value;
-  }
-
-  /// A number as such, or a fraction as a string: step = "1/120".
-  double number(const SceneField& field, const toml::node& node, const std::string& where) const {
-    if (const auto integer = node.value_exact<std::int64_t>()) return static_cast<double>(*integer);
-    if (const auto real = node.value_exact<double>()) return *real;
-    const auto text = node.value_exact<std::string>();
-    if (!text) refuse_type(node, where, "a number, " + range_text(field));
-    if (text->find('/') == std::string::npos) {
-      throw ConfigError(
-          fmt::format("{}: got the string '{}', expected a number, {}; hint: no quotes and no unit", where,
-                      *text, range_text(field)));
+  void read_entry(const std::string& key, const toml::node& node) {
+    const std::vector<std::string> plain_keys = detail::plain_scene_keys();
+    if (key == "material") {
+      read_tables(node, key, [&](const toml::table& table, const std::string& where) {
+        scene_.materials.push_back(material(table, where));
+      });
+    } else if (std::find(plain_keys.begin(), plain_keys.end(), key) != plain_keys.end() &&
+               (key != "lattice" || node.is_table())) {
+      if (!scene_.plain) scene_.plain.emplace();
+      detail::read_plain_scene(*this, key, node, *scene_.plain);
+    } else {
+      read_field(key, node);
     }
-    const auto value = parse_number(*text);
-    if (!value) {
-      throw ConfigError(fmt::format("{}: got '{}', expected a number or a fraction of two, {}", where, *text,
-                                    range_text(field)));
-    }
-    return *value;
   }
 
-  int integer(const SceneField& field, const toml::node& node, const std::string& where) const {
+  /// That a plain scene has a box, and its values.
+  void check_plain(const toml::table& table) const {
+    if (!scene_.plain) return;
+    const toml::node* lattice = table.get("lattice");
+    if (lattice != nullptr && lattice->is_table()) {
+      try {
+        return scene_.plain->validate();
+      } catch (const ConfigError& e) {
+        throw ConfigError(file_ + ": " + e.what());
+      }
+    }
+    throw ConfigError(
+        file_ +
+        ": [lattice]: missing, expected a box; hint: bones and fixed faces belong to scenes without "
+        "a rig, whose flesh is a box");
+  }
+
+  int integer_in(const SceneField& field, const toml::node& node, const std::string& where) const {
     const auto value = node.value_exact<std::int64_t>();
     if (!value) refuse_type(node, where, "a whole number, " + range_text(field));
     check_number(field, static_cast<double>(*value), where);
     return static_cast<int>(*value);
   }
 
-  Eigen::Vector3d vector(const SceneField& field, const toml::node& node, const std::string& where) const {
-    const toml::array* array = node.as_array();
-    if (array == nullptr || array->size() != 3) refuse_type(node, where, "an array of three numbers");
-    Eigen::Vector3d value;
-    for (int i = 0; i < 3; ++i) value[i] = number(field, (*array)[static_cast<std::size_t>(i)], where);
-    return value;
-  }
-
   void read_field(const std::string& key, const toml::node& node) {
     const SceneField* field = find_scene_field(key);
     if (field == nullptr) {
-      std::vector<std::string> keys{"material"};
+      std::vector<std::string> keys = detail::plain_scene_keys();
+      keys.emplace_back("material");
       for (const SceneField& known : scene_fields()) keys.emplace_back(known.key);
       std::sort(keys.begin(), keys.end());
+      keys.erase(std::unique(keys.begin(), keys.end()), keys.end());  // a lattice is a file or a box
       refuse_key(key, node, keys);
     }
     const std::string where = place(node) + ": " + key;
@@ -168,21 +121,19 @@ class SceneReader {
   }
 
   void read_member(const SceneField&, bool Scene::*member, const toml::node& node, const std::string& where) {
-    const auto value = node.value_exact<bool>();
-    if (!value) refuse_type(node, where, "true or false");
-    scene_.*member = *value;
+    scene_.*member = boolean(node, where);
   }
   void read_member(const SceneField& field, int Scene::*member, const toml::node& node,
                    const std::string& where) {
-    scene_.*member = integer(field, node, where);
+    scene_.*member = integer_in(field, node, where);
   }
   void read_member(const SceneField& field, double Scene::*member, const toml::node& node,
                    const std::string& where) {
-    scene_.*member = number(field, node, where);
+    scene_.*member = number(node, where, range_text(field));
   }
   void read_member(const SceneField& field, std::optional<double> Scene::*member, const toml::node& node,
                    const std::string& where) {
-    scene_.*member = number(field, node, where);
+    scene_.*member = number(node, where, range_text(field));
   }
   void read_member(const SceneField&, std::string Scene::*member, const toml::node& node,
                    const std::string& where) {
@@ -194,7 +145,7 @@ class SceneReader {
   }
   void read_member(const SceneField& field, Eigen::Vector3d Scene::*member, const toml::node& node,
                    const std::string& where) {
-    scene_.*member = vector(field, node, where);
+    scene_.*member = vector(node, where, range_text(field));
   }
   /// Frames and names of choices are text in the file as on the command line.
   template <class Member>
@@ -202,51 +153,27 @@ class SceneReader {
     set_from_text(scene_, field, string(node, where), where);
   }
 
-  void read_materials(const toml::node& node) {
-    const toml::array* tables = node.as_array();
-    if (tables == nullptr) refuse_type(node, place(node) + ": material", "tables, [[material]]");
-    for (const toml::node& entry : *tables) {
-      const std::string where = fmt::format("{}: material {}", place(entry), scene_.materials.size() + 1);
-      if (entry.as_table() == nullptr) refuse_type(entry, where, "a table, [[material]]");
-      scene_.materials.push_back(material(*entry.as_table(), where));
-    }
-  }
-
   BoneMaterial material(const toml::table& table, const std::string& where) const {
     BoneMaterial material;
-    for (const auto& [key, node] : in_file_order(table)) {
-      const std::string value_where = place(*node) + ": material " + key;
-      const auto value = [&] {
-        const SceneField& field = *find_scene_field(key);
-        const double number = this->number(field, *node, value_where);
-        check_number(field, number, value_where);
-        return number;
-      };
-      if (key == "bones") {
-        material.bones = patterns(*node, value_where);
-      } else if (key == "young") {
-        material.young = value();
-      } else if (key == "poisson") {
-        material.poisson = value();
-      } else if (key == "density") {
-        material.density = value();
-      } else {
-        refuse_key(key, *node, {"bones", "density", "poisson", "young"});
-      }
-    }
+    const auto value = [&](const char* key, std::optional<double>& member) {
+      return Entry{key, [this, key, &member](const toml::node& node, const std::string& at) {
+                     const SceneField& field = *find_scene_field(key);
+                     member = number(node, at, range_text(field));
+                     check_number(field, *member, at);
+                   }};
+    };
+    read_table(table, where,
+               {{"bones",
+                 [&](const toml::node& node, const std::string& at) { material.bones = strings(node, at); }},
+                value("young", material.young),
+                value("poisson", material.poisson),
+                value("density", material.density)});
     if (material.bones.empty()) {
-      throw ConfigError(where +
-                        ": no bones, expected at least one name or pattern; hint: bones = [\"tail*\"]");
+      throw ConfigError(
+          fmt::format("{}: {}: no bones, expected at least one name or pattern; hint: bones = [\"tail*\"]",
+                      place(table), where));
     }
     return material;
-  }
-
-  std::vector<std::string> patterns(const toml::node& node, const std::string& where) const {
-    const toml::array* array = node.as_array();
-    if (array == nullptr) refuse_type(node, where, "an array of strings");
-    std::vector<std::string> result;
-    for (const toml::node& entry : *array) result.push_back(string(entry, where));
-    return result;
   }
 
   std::string file_;

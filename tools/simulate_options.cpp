@@ -74,7 +74,7 @@ Scene SimulateOptions::scene() const {
   }
   scene.validate();
   if (print_scene_only_) return scene;
-  if (scene.rig.empty()) {
+  if (scene.rig.empty() && !scene.plain) {
     throw assets::ConfigError(
         input_.empty() ? "the rig is missing, expected sinew simulate (SCENE.toml | RIG) -o OUT; hint: try "
                          "assets/samples/hopper.glb"

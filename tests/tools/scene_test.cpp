@@ -184,16 +184,16 @@ TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
        "scene.toml:1: material 1: no bones, expected at least one name or pattern; hint: bones = "
        "[\"tail*\"]"},
       {"[[material]]\nbones = [\"a\"]\n\npoisson = 0.7",
-       "scene.toml:4: material poisson: got 0.7, expected -1 < nu < 0.5; hint: 0.49"},
+       "scene.toml:4: material 1: poisson: got 0.7, expected -1 < nu < 0.5; hint: 0.49"},
       {"[[material]]\nbones = \"a\"",
-       "scene.toml:2: material bones: got a string, expected an array of strings"},
+       "scene.toml:2: material 1: bones: got a string, expected an array of strings"},
   };
   for (const auto& [text, message] : cases) EXPECT_EQ(refusal(text), message) << "scene: " << text;
 }
 
 TEST_F(SceneFile, ListsTheKnownKeysWhereNoneIsNear) {
   const std::string message = refusal("temperature = 3");
-  EXPECT_EQ(message.rfind("scene.toml:1: temperature: unknown key; hint: known are cells, clip, damping,", 0),
+  EXPECT_EQ(message.rfind("scene.toml:1: temperature: unknown key; hint: known are bone, cells, clip,", 0),
             0u)
       << message;
 }
