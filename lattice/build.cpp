@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -12,6 +12,7 @@
 #include "lattice/detail/inspection.h"
 #include "lattice/detail/lattice_points.h"
 #include "lattice/detail/optimise.h"
+#include "lattice/detail/retries.h"
 #include "lattice/detail/rig_input.h"
 #include "lattice/detail/separate_limbs.h"
 #include "lattice/detail/skeleton_reduction.h"
@@ -27,34 +28,12 @@ using namespace detail;
 constexpr int kSearchSteps = 8;
 constexpr double kCloseEnough = 0.05;
 
-/// What one attempt is made with.
-struct Attempt {
-  double h_factor = 1.0;
-  ReductionOptions reduction;
-  PointOptions points;
-};
-
 /// A lattice in unit coordinates.
 struct Draft {
   ReducedSkeleton skeleton;
   LatticePoints points;
   Tetrahedra cells;
 };
-
-/// Retries in order, cheapest change first.
-std::vector<Attempt> attempts(const BuildOptions& options) {
-  std::vector<Attempt> list(7);
-  list[1].h_factor = 0.93;
-  list[2].h_factor = 1.08;
-  list[3].reduction.smallest_bone = 0.6;
-  list[4].reduction.smallest_bone = 0.7;
-  list[5].points.exclusion = 0.7;
-  list[6].reduction.chain_degrees = 25.0;
-  list[6].reduction.too_close = 0.3;
-  list.resize(std::min<std::size_t>(list.size(), static_cast<std::size_t>(options.max_retries) + 1));
-  for (Attempt& attempt : list) attempt.reduction.tip_bones = options.tip_bones;
-  return list;
-}
 
 Draft make_draft(const RigInput& input, double h, const Attempt& attempt, const SkinSamples& samples) {
   Draft draft;
@@ -139,12 +118,35 @@ ControlLattice make_attempt(const RigInput& input, double h, const Attempt& atte
   return lattice;
 }
 
-/// Fewest intolerable failures, then fewest failures.
-bool is_better(const std::vector<GateFailure>& a, const std::vector<GateFailure>& b) {
-  const auto intolerable = [](const std::vector<GateFailure>& list) {
-    return std::count_if(list.begin(), list.end(), [](const GateFailure& f) { return !f.tolerable; });
+/// An attempt and what the gate says of it.
+struct Outcome {
+  ControlLattice lattice;
+  Inspection found;
+  std::vector<GateFailure> failures;
+};
+
+/// Fewest intolerable failures, then fewest failures, then the better worst cell.
+bool is_better(const Outcome& a, const Outcome& b, const BuildOptions& options) {
+  const auto intolerable = [](const Outcome& o) {
+    return std::count_if(o.failures.begin(), o.failures.end(),
+                         [](const GateFailure& f) { return !f.tolerable; });
   };
-  return intolerable(a) != intolerable(b) ? intolerable(a) < intolerable(b) : a.size() < b.size();
+  const auto shape = [&](const Outcome& o) {
+    return std::min(o.found.quality.min_dihedral_degrees / std::max(1e-9, options.min_dihedral_degrees),
+                    o.found.quality.min_scaled_jacobian / std::max(1e-9, options.min_scaled_jacobian));
+  };
+  if (intolerable(a) != intolerable(b)) return intolerable(a) < intolerable(b);
+  if (a.failures.size() != b.failures.size()) return a.failures.size() < b.failures.size();
+  return shape(a) > shape(b);
+}
+
+Outcome try_out(const RigInput& input, double h, const Attempt& attempt, const BuildOptions& options) {
+  Outcome outcome;
+  outcome.lattice = make_attempt(input, h * attempt.h_factor, attempt);
+  outcome.found = inspect(outcome.lattice, input.skin, input.unit_skin);
+  outcome.lattice.quality = outcome.found.quality;
+  outcome.failures = judge(outcome.found, options);
+  return outcome;
 }
 
 }  // namespace
@@ -152,23 +154,37 @@ bool is_better(const std::vector<GateFailure>& a, const std::vector<GateFailure>
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
   options.validate();
   const RigInput input = make_rig_input(skin, joints, options);
-  const std::vector<Attempt> list = attempts(options);
+  const std::vector<Attempt> planned = planned_attempts(options);
   const double h = options.cell_size ? *options.cell_size / input.unit_skin.scale
-                                     : find_edge_length(input, options.cells, list.front());
-  BuildResult best;
-  int tried = 0;
-  for (const Attempt& attempt : list) {
-    BuildResult result;
-    result.lattice = make_attempt(input, h * attempt.h_factor, attempt);
-    const Inspection found = inspect(result.lattice, skin, input.unit_skin);
-    result.lattice.quality = found.quality;
-    result.failures = judge(found, options);
-    if (tried == 0 || is_better(result.failures, best.failures)) best = std::move(result);
-    ++tried;
-    if (best.failures.empty()) break;
+                                     : find_edge_length(input, options.cells, planned.front());
+  BuildResult result;
+  std::optional<Outcome> best;
+  Attempt best_attempt;
+  const auto passes = [&](const Attempt& attempt) {
+    Outcome outcome = try_out(input, h, attempt, options);
+    if (!outcome.failures.empty()) result.refused.push_back({attempt.name, outcome.failures});
+    if (!best || is_better(outcome, *best, options)) best = std::move(outcome), best_attempt = attempt;
+    return best->failures.empty();
+  };
+  bool passed = passes(planned.front());
+  const bool grid_is_idle = !passed && is_shaped_by_bones(best->lattice, best->found, options);
+  for (std::size_t i = 1; i < planned.size() && !passed; ++i)
+    if (!(grid_is_idle && planned[i].moves_grid_only)) passed = passes(planned[i]);
+  // What no threshold cures: bones give way, one after the other.
+  const std::string base = best_attempt.name;
+  for (std::size_t i = planned.size(); i <= static_cast<std::size_t>(options.max_retries) && !passed; ++i) {
+    const std::optional<SoftBone> bone = offending_bone(best->lattice, best->found, options);
+    if (!bone) break;
+    Attempt attempt = best_attempt;
+    attempt.reduction.soft_bones.push_back(*bone);
+    attempt.name = fmt::format("{}, {} bones soft", base, attempt.reduction.soft_bones.size());
+    passed = passes(attempt);
+    if (best_attempt.name != attempt.name) break;  // it did not help
   }
-  best.lattice.retries = tried - 1;
-  return best;
+  result.lattice = std::move(best->lattice);
+  result.failures = std::move(best->failures);
+  result.lattice.retries = static_cast<int>(result.refused.size()) - (result.failures.empty() ? 0 : 1);
+  return result;
 }
 
 }  // namespace sinew::lattice

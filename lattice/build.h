@@ -40,11 +40,12 @@ struct BuildOptions {
   /// With Auto, a rig that is its own mirror image to 1e-5 of its size gets a lattice that is its own mirror
   /// image.
   Symmetry symmetry = Symmetry::Auto;
-  /// Retries after a failed gate; 0 = one attempt only.
-  int max_retries = 6;
+  /// Retries after a failed gate; 0 = one attempt only. What varies is the place and size of the grid, then
+  /// the thresholds that reduce the skeleton; in the end bones at refused cells become soft, one by one.
+  int max_retries = 12;
   /// Gate thresholds.
-  double min_dihedral_degrees = 8.0;
-  double min_scaled_jacobian = 0.08;
+  double min_dihedral_degrees = 10.0;
+  double min_scaled_jacobian = 0.10;
 
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;
@@ -62,9 +63,18 @@ struct GateFailure {
   bool tolerable = false;
 };
 
+/// One attempt that the gate refused.
+struct RefusedAttempt {
+  std::string name;  ///< what it was made with, "h x 0.93".
+  std::vector<GateFailure> failures;
+};
+
 struct BuildResult {
-  ControlLattice lattice;  ///< the best attempt: fewest intolerable failures, then fewest failures.
-  std::vector<GateFailure> failures;  ///< of that attempt.
+  /// The attempt that passed, else the best: fewest intolerable failures, then fewest failures, then best
+  /// shape.
+  ControlLattice lattice;
+  std::vector<GateFailure> failures;    ///< of that attempt.
+  std::vector<RefusedAttempt> refused;  ///< in order; with a lattice that failed, all attempts.
 };
 
 /// Builds a lattice of tetrahedra round `skin` in which the bones of `joints` are chains of edges.

@@ -79,12 +79,13 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
   // Cubes of side 2h/sqrt(3) with a point in the middle: neighbours along a diagonal are h apart.
   const double side = 2.0 * h / std::sqrt(3.0);
   const Vector3d reach = skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() + kGridReach * h;
-  const Eigen::Vector3i count = (2.0 * reach / side).array().ceil().cast<int>();
+  const Vector3d shift = Vector3d::Constant(options.shift * side);
+  const Eigen::Vector3i count = (2.0 * reach / side).array().ceil().cast<int>() + 1;
   for (int i = -count.x(); i <= count.x(); ++i)
     for (int j = -count.y(); j <= count.y(); ++j)
       for (int k = -count.z(); k <= count.z(); ++k) {
         if ((i - j) % 2 != 0 || (j - k) % 2 != 0) continue;  // all even or all odd
-        const Vector3d p = 0.5 * side * Vector3d(i, j, k);
+        const Vector3d p = 0.5 * side * Vector3d(i, j, k) + shift;
         if ((p.cwiseAbs().array() > reach.array()).any()) continue;
         if (!skin.query.is_within(p, kGridReach * h) && !skin.is_inside(p)) continue;
         if (!clearance.is_too_close(p)) out.add(p, {});

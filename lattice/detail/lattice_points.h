@@ -33,6 +33,7 @@ Eigen::Vector3d point_on_bone(const ReducedSkeleton& skeleton, int bone, double 
 /// How free points keep away from the bones.
 struct PointOptions {
   double exclusion = 0.62;  ///< in units of min(h, max(l, h/2)), l the length of the bone piece.
+  double shift = 0.0;       ///< of the grid, along all axes, in units of the side of its cubes.
 };
 
 /// True where a free point would come too close to a piece of some bone: the ball about the middle of each

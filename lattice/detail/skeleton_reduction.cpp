@@ -39,6 +39,7 @@ class Reduction {
     chain_siblings();
     soften_close_bones();
     add_tips();
+    soften_wanted_bones();
     drop_unused_nodes();
     name_bones();
     return std::move(result_);
@@ -61,6 +62,7 @@ class Reduction {
   void chain_siblings();
   bool chain_one_pair();
   void soften_close_bones();
+  void soften_wanted_bones();
   void soften(int bone, const std::string& reason);
   bool is_leaf(const ReducedBone& bone) const;
   void add_tips();
@@ -247,6 +249,16 @@ void Reduction::soften_close_bones() {
                          joints_.names[result_.nodes[taken.end].joint], metres(distance),
                          joints_.names[result_.nodes[other.start].joint],
                          joints_.names[result_.nodes[other.end].joint]));
+    }
+}
+
+void Reduction::soften_wanted_bones() {
+  for (const SoftBone& wanted : options_.soft_bones)
+    for (int b = 0; b < static_cast<int>(result_.bones.size()); ++b) {
+      const ReducedBone& bone = result_.bones[b];
+      if (!bone.soft && bone.frame == wanted.frame && bone.tip == wanted.tip &&
+          result_.nodes[bone.end].joint == wanted.end_joint)
+        soften(b, wanted.reason);
     }
 }
 

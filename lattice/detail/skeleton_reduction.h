@@ -9,14 +9,25 @@
 
 namespace sinew::lattice::detail {
 
+/// A bone that shall be soft whatever the geometry says.
+struct SoftBone {
+  int frame = -1;      ///< joint.
+  int end_joint = -1;  ///< the joint at its end.
+  bool tip = false;
+  std::string reason;  ///< for the report.
+};
+
 /// Thresholds of the reduction; lengths in units of h.
 struct ReductionOptions {
-  double smallest_bone = 0.5;   ///< shorter bones are contracted.
-  double cut_distance = 0.25;   ///< a bone farther than this outside the skin may be cut.
-  double cut_length = 0.5;      ///< so long a bone may be cut.
-  double chain_degrees = 15.0;  ///< siblings within this angle are chained.
-  double too_close = 0.15;      ///< bones nearer than this cannot both be edges.
+  double smallest_bone = 0.5;  ///< shorter bones are contracted.
+  double cut_distance = 0.25;  ///< a bone farther than this outside the skin may be cut.
+  double cut_length = 0.5;     ///< so long a bone may be cut.
+  /// Siblings within this angle are chained: in a cell between two bones that are an angle apart the scaled
+  /// Jacobian is below its sine, and a third direction halves it.
+  double chain_degrees = 20.0;
+  double too_close = 0.15;  ///< bones nearer than this cannot both be edges.
   TipBones tip_bones = TipBones::On;
+  std::vector<SoftBone> soft_bones;
 };
 
 /// A point of the reduced skeleton: several joints may share it after contraction.

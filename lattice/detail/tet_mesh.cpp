@@ -15,6 +15,8 @@ using Tet = TetMesh::Tet;
 /// A flip must raise the smallest quality by this much, so that rounding cannot make two flips alternate.
 constexpr double kGain = 1e-6;
 constexpr int kLargestRing = 7;
+/// Weight of the scaled Jacobian against the sine of the dihedral angles.
+constexpr double kJacobianScale = 1.4;
 
 /// Corners of the faces, counter-clockwise from outside; face k is opposite to corner k.
 constexpr std::array<std::array<int, 3>, 4> kFaces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
@@ -53,7 +55,45 @@ double best_triangulation(int n, const Worth& worth, std::vector<std::array<int,
   return best[0][n - 1];
 }
 
+/// A face with the sides p, q, r (squared lengths): the squares of its medians to those sides.
+Vector3d squared_medians(double p, double q, double r) {
+  return 0.25 * Vector3d(2 * (q + r) - p, 2 * (r + p) - q, 2 * (p + q) - r);
+}
+
+/// The scaled Jacobian at every corner of the four level-1 hexahedra is 6 V over a product of three lengths;
+/// the largest of these products, squared, from the squares of the edges ab, ac, ad, bc, bd, cd. With the
+/// medians m of the faces and n of the cell the products are: at a vertex, its three edges; at the middle of
+/// an edge, the edge and the two medians to it; in the middle of a face, 4/3 n and two of its medians; in the
+/// middle of the cell, 27/16 n_b n_c n_d.
+double largest_corner(const std::array<double, 6>& e) {
+  const auto [ab, ac, ad, bc, bd, cd] = e;
+  const double edges = std::max({ab * ac * ad, ab * bc * bd, ac * bc * cd, ad * bd * cd});
+  // Medians of the faces opposite to a, b, c, d.
+  const Vector3d ma = squared_medians(bc, bd, cd), mb = squared_medians(ac, ad, cd),
+                 mc = squared_medians(ab, ad, bd), md = squared_medians(ab, ac, bc);
+  const double middles = std::max({ab * mc[0] * md[0], ac * mb[0] * md[1], bc * ma[0] * md[2],
+                                   ad * mb[1] * mc[1], bd * ma[1] * mc[2], cd * ma[2] * mb[2]});
+  // Squares of the lines from a vertex to the mean of the opposite face.
+  const double na = (3 * (ab + ac + ad) - (bc + bd + cd)) / 9.0,
+               nb = (3 * (ab + bc + bd) - (ac + ad + cd)) / 9.0,
+               nc = (3 * (ac + bc + cd) - (ab + ad + bd)) / 9.0,
+               nd = (3 * (ad + bd + cd) - (ab + ac + bc)) / 9.0;
+  const auto two_largest = [](const Vector3d& m) { return m.prod() / m.minCoeff(); };
+  const double faces =
+      16.0 / 9.0 *
+      std::max({na * two_largest(ma), nb * two_largest(mb), nc * two_largest(mc), nd * two_largest(md)});
+  const double centre = 729.0 / 256.0 * (na * nb * nc * nd) / std::min({na, nb, nc, nd});
+  return std::max({edges, middles, faces, centre});
+}
+
 }  // namespace
+
+double level1_jacobian(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+  const Vector3d ab = b - a, ac = c - a, ad = d - a;
+  return ab.cross(ac).dot(ad) /
+         std::sqrt(largest_corner({ab.squaredNorm(), ac.squaredNorm(), ad.squaredNorm(),
+                                   (c - b).squaredNorm(), (d - b).squaredNorm(), (d - c).squaredNorm()}));
+}
 
 double tetrahedron_quality(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   const Vector3d ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b, cd = d - c;
@@ -67,9 +107,10 @@ double tetrahedron_quality(const Vector3d& a, const Vector3d& b, const Vector3d&
   // sin(dihedral at edge e) = 3 V |e| / (2 A1 A2) = volume6 |e| / (f1 f2).
   const double sine = volume6 * std::min({lab / (fc * fd), lac / (fb * fd), lad / (fb * fc), lbc / (fa * fd),
                                           lbd / (fa * fc), lcd / (fa * fb)});
-  const double corner =
-      volume6 / std::max({lab * lac * lad, lab * lbc * lbd, lac * lbc * lcd, lad * lbd * lcd});
-  return std::min(sine, 1.4 * corner);
+  return std::min(sine,
+                  kJacobianScale * volume6 /
+                      std::sqrt(largest_corner({ab.squaredNorm(), ac.squaredNorm(), ad.squaredNorm(),
+                                                bc.squaredNorm(), bd.squaredNorm(), cd.squaredNorm()})));
 }
 
 bool tetrahedron_contains(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d,

@@ -9,8 +9,13 @@
 
 namespace sinew::lattice::detail {
 
-/// Smallest sine of the six dihedral angles and 1.4 times the smallest scaled corner Jacobian, whichever is
-/// less; about 0.94 for a regular tetrahedron, 0 for a flat one, -1 for an inverted one.
+/// Smallest scaled Jacobian over the corners of the four hexahedra into which one subdivision cuts the
+/// tetrahedron: 0.707 for a regular one. In closed form, as it is asked for more often than anything else.
+double level1_jacobian(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                       const Eigen::Vector3d& d);
+
+/// Smallest sine of the six dihedral angles and 1.4 times the level-1 Jacobian, whichever is less; about 0.94
+/// for a regular tetrahedron, 0 for a flat one, -1 for an inverted one.
 double tetrahedron_quality(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                            const Eigen::Vector3d& d);
 

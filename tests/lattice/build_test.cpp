@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <set>
 
 #include <Eigen/Geometry>
@@ -11,6 +12,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "lattice/detail/retries.h"
+#include "lattice/detail/rig_input.h"
 #include "tests/lattice/limbs.h"
 
 namespace sinew::lattice {
@@ -168,6 +171,66 @@ TEST(Build, TakesACellSizeInMetres) {
     EXPECT_GT(volume, 0.5 * grid_cell) << size;
     EXPECT_LT(volume, grid_cell) << size;
   }
+}
+
+/// Seven bones out of one point, neighbours 25 degrees apart: nothing to chain, but cells between three of
+/// them are needles.
+Limb fan() {
+  Limb limb;
+  limb.add_joint("palm", -1, {0, -0.5, 0});
+  limb.add_joint("wrist", 0, {0, 0, 0});
+  limb.add_capsule(0, {0, -0.5, 0}, {0, 0, 0}, 0.25);
+  for (int i = 0; i < 7; ++i) {
+    const double around = 2.0 * std::numbers::pi * i / 6, tilt = i == 6 ? 0.0 : 0.44;
+    const Vector3d end = (1.0 + 0.05 * i) * Vector3d(std::sin(tilt) * std::cos(around), std::cos(tilt),
+                                                     std::sin(tilt) * std::sin(around));
+    const int finger = limb.add_joint("finger_" + std::to_string(i), 1, end);
+    limb.add_capsule(1, {0, 0, 0}, end, 0.2);
+    limb.add_capsule(finger, end, 1.3 * end, 0.2);
+  }
+  return limb;
+}
+
+TEST(Build, ReducesTheSkeletonFartherWhereTheGateRefuses) {
+  const Limb limb = fan();
+  // Between three directions 25 degrees apart the Jacobian is at most sin(25) sin(25) cos(12.5) = 0.17.
+  BuildOptions options{.cells = 300, .max_retries = 0, .min_scaled_jacobian = 0.2};
+  const BuildResult first = build(limb.skin, limb.joints, options);
+  ASSERT_EQ(first.refused.size(), 1u);
+  EXPECT_EQ(first.refused[0].name, "as asked");
+  EXPECT_EQ(first.lattice.retries, 0);
+  EXPECT_LT(first.lattice.quality.min_scaled_jacobian, 0.17);
+
+  options.max_retries = 12;
+  const BuildResult result = build(limb.skin, limb.joints, options);
+  EXPECT_THAT(result.failures, testing::IsEmpty());
+  EXPECT_GE(result.lattice.quality.min_scaled_jacobian, 0.2);
+  ASSERT_FALSE(result.refused.empty());
+  EXPECT_EQ(static_cast<std::size_t>(result.lattice.retries), result.refused.size());
+  for (const RefusedAttempt& attempt : result.refused)
+    EXPECT_EQ(attempt.name.find("h x"), std::string::npos) << "another grid cannot help here";
+  EXPECT_TRUE(std::any_of(result.lattice.changes.begin(), result.lattice.changes.end(),
+                          [](const SkeletonChange& change) { return change.what == "chained"; }));
+  expect_sound(result.lattice, limb);
+}
+
+TEST(Retries, FindTheBoneThatSpoilsACell) {
+  const Limb limb = fan();
+  const BuildOptions options{.cells = 300, .max_retries = 0, .min_scaled_jacobian = 0.2};
+  const ControlLattice lattice = build(limb.skin, limb.joints, options).lattice;
+  const detail::Inspection found = detail::inspect(lattice, limb.skin, detail::make_unit_skin(limb.skin));
+  const std::optional<detail::SoftBone> bone = detail::offending_bone(lattice, found, options);
+  ASSERT_TRUE(bone);
+  EXPECT_EQ(bone->frame, 1);  // one of the wrist's
+  const detail::RigInput input = detail::make_rig_input(limb.skin, limb.joints);
+  detail::ReductionOptions reduction;
+  reduction.soft_bones = {*bone};
+  const detail::ReducedSkeleton skeleton =
+      detail::reduce_skeleton(input.unit_skin, input.unit_joints, input.weights,
+                              lattice.edge_length / input.unit_skin.scale, reduction);
+  const auto soft = [](const detail::ReducedBone& b) { return b.soft; };
+  EXPECT_EQ(std::count_if(skeleton.bones.begin(), skeleton.bones.end(), soft), 1);
+  EXPECT_TRUE(detail::is_shaped_by_bones(lattice, found, options));
 }
 
 /// Names of the lattice's bones and of its soft frames.

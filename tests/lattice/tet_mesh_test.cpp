@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "lattice/detail/triangle_grid.h"
+#include "lattice/quality.h"
 #include "tests/lattice/shapes.h"
 
 namespace sinew::lattice::detail {
@@ -30,6 +31,21 @@ TEST(TetrahedronQuality, OfTheRegularTetrahedronIsTheSineOfItsDihedral) {
   EXPECT_NEAR(tetrahedron_quality(a, c, b, d), std::sqrt(8.0) / 3.0, 1e-15);
   EXPECT_EQ(tetrahedron_quality(a, b, c, d), -1.0);
   EXPECT_EQ(tetrahedron_quality(a, c, b, Vector3d(1, 0, 0)), -1.0);  // flat: d in the plane of a, b, c
+}
+
+TEST(Level1Jacobian, IsThatOfTheHexahedraOfASubdivision) {
+  std::mt19937_64 rng(11);
+  CellComplex complex;
+  complex.points.resize(4, 3);
+  complex.cells.push_back({CellType::Tetrahedron, {0, 1, 2, 3, -1, -1, -1, -1}});
+  for (int i = 0; i < 1000; ++i) {
+    for (int k = 0; k < 4; ++k) complex.points.row(k) = tests::uniform_point(rng, -1, 1).transpose();
+    if (cell_volume(complex, complex.cells[0]) < 0.0) complex.points.row(0).swap(complex.points.row(1));
+    const auto p = [&](int k) -> Vector3d { return complex.points.row(k).transpose(); };
+    // Thin cells have small edges from differences of coordinates below 1: 1e-16 over the flatness.
+    EXPECT_NEAR(level1_jacobian(p(0), p(1), p(2), p(3)), min_scaled_jacobian(complex, complex.cells[0]),
+                1e-12);
+  }
 }
 
 /// A double cone: `n` points round the axis from a = (0, 0, -1) to b = (0, 0, 1), and the cells round that
