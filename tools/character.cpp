@@ -1,5 +1,6 @@
 #include "tools/character.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -102,6 +103,34 @@ std::vector<Eigen::Affine3d> Character::pose(double time) const {
 
 namespace {
 
+std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::vector<std::string>& names,
+                           const std::string& where) {
+  std::vector<int> joints;
+  for (const std::string& pattern : patterns) {
+    const std::vector<int> found = matching(pattern, names);
+    if (found.empty()) throw assets::ConfigError(where + ": " + no_such_bone(pattern, names));
+    joints.insert(joints.end(), found.begin(), found.end());
+  }
+  std::sort(joints.begin(), joints.end());
+  joints.erase(std::unique(joints.begin(), joints.end()), joints.end());
+  return joints;
+}
+
+}  // namespace
+
+lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::string>& joints) {
+  lattice::BuildOptions options;
+  options.cells = scene.cells;
+  options.cell_size = scene.cell_size;
+  options.include = joints_of(scene.bones_include, joints, "bones_include");
+  options.exclude = joints_of(scene.bones_exclude, joints, "bones_exclude");
+  options.tip_bones = scene.tip_bones == Switch::On ? lattice::TipBones::On : lattice::TipBones::Off;
+  options.symmetry = scene.symmetry == Switch::On ? lattice::Symmetry::Auto : lattice::Symmetry::Off;
+  return options;
+}
+
+namespace {
+
 void load_rig(const Scene& scene, const Talk& talk, Character& c) {
   {
     const Phase phase(c.times, "load");
@@ -117,8 +146,7 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
   }
   {
     const Phase phase(c.times, "lattice");
-    lattice::BuildOptions options;
-    options.cells = scene.cells;
+    const lattice::BuildOptions options = build_options(scene, c.input.joints.names);
     if (scene.lattice.empty()) {
       c.lattice = lattice::build(c.input.skin.surface, c.input.joints, options);
     } else {

@@ -40,6 +40,10 @@ using Talk = std::function<void(const std::string&)>;
 /// of assets/error.h, and NumericalError where the lattice has a failure that a simulation cannot bear.
 Character make_character(const Scene& scene, const Talk& talk);
 
+/// The builder's options for a scene and the names of a rig's joints. Throws assets::ConfigError for a
+/// pattern that fits no joint, naming the nearest.
+lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::string>& joints);
+
 /// The flesh of the character. Throws assets::InputError naming the rig where the lattice cannot carry it.
 fem::Body make_body(const Character& character);
 

@@ -7,18 +7,11 @@
 
 #include "assets/error.h"
 #include "tools/scene_fields.h"
+#include "tools/suggest.h"
 #include "tools/toml_text.h"
 
 namespace sinew::tools {
 namespace {
-
-struct MaterialValue {
-  const char* key;
-  std::optional<double> BoneMaterial::*member;
-};
-constexpr MaterialValue kMaterialValues[] = {{"young", &BoneMaterial::young},
-                                             {"poisson", &BoneMaterial::poisson},
-                                             {"density", &BoneMaterial::density}};
 
 /// `*` stands for any letters, `?` for one.
 bool matches(std::string_view pattern, std::string_view name) {
@@ -41,24 +34,19 @@ bool matches(std::string_view pattern, std::string_view name) {
   return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
-std::string toml_strings(const std::vector<std::string>& texts) {
-  std::string list;
-  for (const std::string& text : texts) list += (list.empty() ? "" : ", ") + toml_quoted(text, "bones");
-  return "[" + list + "]";
-}
-
 std::string print_material(const BoneMaterial& material) {
-  std::string text = "\n[[material]]\nbones = " + toml_strings(material.bones) + "\n";
-  for (const auto& [key, member] : kMaterialValues) {
-    if (material.*member) text += fmt::format("{} = {}\n", key, *(material.*member));
+  std::string text = "\n[[material]]\nbones = " + toml_quoted(material.bones, "bones") + "\n";
+  for (const auto& [field, member] : material_values()) {
+    if (material.*member) text += fmt::format("{} = {}\n", field->key, *(material.*member));
   }
   return text;
 }
 
 /// Keys that say something about a rig; a plain scene has none of them.
 bool is_of_characters(std::string_view key) {
-  constexpr std::string_view kKeys[] = {"rig",    "clip",         "lattice",    "cells",
-                                        "height", "output_space", "output_mesh"};
+  constexpr std::string_view kKeys[] = {"rig",       "clip",          "lattice",       "cells",
+                                        "cell_size", "bones_include", "bones_exclude", "tip_bones",
+                                        "symmetry",  "height",        "output_space",  "output_mesh"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 
@@ -79,18 +67,37 @@ void check_plain(const Scene& scene) {
   }
 }
 
+/// A lattice that is read is not built.
+void check_no_builder_keys(const Scene& scene) {
+  for (const char* key : {"cell_size", "bones_include", "bones_exclude"}) {
+    const SceneField& field = *find_scene_field(key);
+    if (flag_text(scene, field).empty()) continue;
+    throw assets::ConfigError(
+        fmt::format("{}: got {}, expected nothing as the lattice is read from {}; hint: leave one "
+                    "of the two out",
+                    key, flag_text(scene, field), scene.lattice));
+  }
+}
+
 }  // namespace
+
+std::vector<MaterialValue> material_values() {
+  return {{find_scene_field("young"), &BoneMaterial::young},
+          {find_scene_field("poisson"), &BoneMaterial::poisson},
+          {find_scene_field("density"), &BoneMaterial::density}};
+}
 
 void Scene::validate() const {
   for (const SceneField& field : scene_fields()) check_field(*this, field, std::string(field.key));
   if (plain) check_plain(*this);
+  if (!lattice.empty()) check_no_builder_keys(*this);
   for (std::size_t i = 0; i < materials.size(); ++i) {
     const std::string where = fmt::format("material {}", i + 1);
     if (materials[i].bones.empty())
       throw assets::ConfigError(where + ": no bones, expected at least one name");
-    for (const auto& [key, member] : kMaterialValues) {
+    for (const auto& [field, member] : material_values()) {
       if (materials[i].*member)
-        check_number(*find_scene_field(key), *(materials[i].*member), where + ": " + key);
+        check_number(*field, *(materials[i].*member), fmt::format("{}: {}", where, field->key));
     }
   }
 }
@@ -109,22 +116,42 @@ std::string print_scene(const Scene& scene) {
   return text;
 }
 
+std::vector<int> matching(const std::string& pattern, const std::vector<std::string>& names) {
+  std::vector<int> found;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (matches(pattern, names[i])) found.push_back(static_cast<int>(i));
+  }
+  return found;
+}
+
+std::string no_such_bone(const std::string& pattern, const std::vector<std::string>& names) {
+  std::string letters = pattern;
+  std::erase_if(letters, [](char letter) { return letter == '*' || letter == '?'; });
+  const bool open_ended = pattern.ends_with('*');
+  std::vector<std::string> candidates = names;  // of "tial*" the beginnings count
+  for (std::string& name : candidates) {
+    if (open_ended) name = name.substr(0, letters.size());
+  }
+  std::string guess = nearest(letters, candidates);
+  if (!guess.empty() && open_ended) guess += '*';
+  if (!guess.empty()) return fmt::format("no bone is named '{}'; hint: did you mean {}?", pattern, guess);
+  constexpr std::size_t kMost = 20;
+  const std::size_t shown = std::min(names.size(), kMost);
+  return fmt::format("no bone is named '{}', expected one of {}{}", pattern,
+                     fmt::join(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+                     names.size() > shown ? fmt::format(" and {} more", names.size() - shown) : "");
+}
+
 std::vector<int> material_of_bone(const Scene& scene, const std::string& rig_file,
                                   const std::vector<std::string>& bone_names) {
   std::vector<int> material(bone_names.size(), -1);
   for (std::size_t m = 0; m < scene.materials.size(); ++m) {
     for (const std::string& pattern : scene.materials[m].bones) {
-      bool found = false;
-      for (std::size_t bone = 0; bone < bone_names.size(); ++bone) {
-        if (!matches(pattern, bone_names[bone])) continue;
-        material[bone] = static_cast<int>(m);
-        found = true;
-      }
-      if (!found) {
-        throw assets::InputError(
-            rig_file, fmt::format("material {}: no bone is named '{}', expected one of {}", m + 1, pattern,
-                                  fmt::join(bone_names, ", ")));
-      }
+      const std::vector<int> found = matching(pattern, bone_names);
+      for (const int bone : found) material[static_cast<std::size_t>(bone)] = static_cast<int>(m);
+      if (found.empty())
+        throw assets::InputError(rig_file,
+                                 fmt::format("material {}: {}", m + 1, no_such_bone(pattern, bone_names)));
     }
   }
   return material;

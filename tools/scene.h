@@ -20,6 +20,8 @@ enum class Precision { Double, Float };
 /// Units and axes of what is written: the input file's own, or metres with Y up.
 enum class OutputSpace { File, Si };
 
+enum class Switch { Off, On };
+
 /// Output frames first ... last, both included; frame k shows the clip at t0 + k / fps.
 struct FrameRange {
   int first = 0;  ///< >= 0.
@@ -68,6 +70,16 @@ struct Scene {
   std::string lattice;
   /// Wanted number of lattice cells [-]; 20 ... 1e6.
   int cells = 1000;
+  /// Wanted edge of the lattice's cells [m]; 1e-4 ... 1e3. Set: `cells` is not used.
+  std::optional<double> cell_size;
+  /// Joints that may have bones, with * for any letters and ? for one; empty: all.
+  std::vector<std::string> bones_include;
+  /// Joints that have none: what hangs on them hangs on the joint above.
+  std::vector<std::string> bones_exclude;
+  /// Bones for weighted joints without children; off: soft frames hold their skin.
+  Switch tip_bones = Switch::On;
+  /// A mirror-symmetric rig gets a mirror-symmetric lattice; off: nobody looks.
+  Switch symmetry = Switch::On;
   /// Finest active level of the hierarchy [-]; 0 ... 3. 1, as tetrahedra of level 0 alone are far too stiff.
   int levels = 1;
 
@@ -104,6 +116,8 @@ struct Scene {
   std::optional<FrameRange> frames;
   /// Longest time that the flesh may take to settle before the first frame [s]; 0 ... 3600.
   double settle = 5.0;
+  /// The contact sheet of frames.
+  Switch preview = Switch::On;
   /// Threads; 0 ... 1024, 0 = all. The results do not depend on it.
   int threads = 0;
   /// The artist's own mesh (OBJ or PLY), whose vertex order the output takes over; empty: the rig's order.
@@ -125,6 +139,12 @@ Scene read_scene(const std::string& file);
 /// text lies in the current directory. Throws assets::ConfigError for a path that is not UTF-8: TOML cannot
 /// hold it.
 std::string print_scene(const Scene& scene);
+
+/// Indices of the names that a pattern fits; * stands for any letters, ? for one.
+std::vector<int> matching(const std::string& pattern, const std::vector<std::string>& names);
+
+/// One sentence for a pattern that fits none of them: the nearest, or the first of all.
+std::string no_such_bone(const std::string& pattern, const std::vector<std::string>& names);
 
 /// For every bone the index of its material in scene.materials, or -1 for the scene's own. Throws
 /// assets::InputError (for `rig_file`) where a pattern fits no bone.

@@ -36,6 +36,19 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"clip", &Scene::clip, "name of the clip; left out: the first with at least two keys"},
     {"lattice", PathMember{&Scene::lattice}, "lattice file (.vtu, .mesh); left out: one is built"},
     {"cells", &Scene::cells, "wanted number of lattice cells", "cells", {20, kMaxCells}, "", "1000"},
+    {"cell_size",
+     &Scene::cell_size,
+     "wanted edge of the lattice's cells instead of their number",
+     "cell_size",
+     {1e-4, 1e3},
+     "m",
+     "a quarter of a limb's thickness"},
+    {"bones_include", &Scene::bones_include,
+     "joints that may have bones (* any letters, ? one); left out: all"},
+    {"bones_exclude", &Scene::bones_exclude,
+     "joints that have none; what hangs on them hangs on the joint above"},
+    {"tip_bones", &Scene::tip_bones, "on or off: bones for weighted joints without children"},
+    {"symmetry", &Scene::symmetry, "on or off: a mirror-symmetric lattice for a mirror-symmetric rig"},
     {"levels", &Scene::levels, "finest active level of the hierarchy", "levels", {0, 3}, "", "1"},
     {"young",
      &Scene::young,
@@ -76,6 +89,7 @@ constexpr auto kFields = std::to_array<SceneField>({
      {0.0, 3600.0},
      "s",
      "5"},
+    {"preview", &Scene::preview, "on or off: the picture of eight frames"},
     {"threads",
      &Scene::threads,
      "threads, 0 = all; the results do not depend on it",
@@ -90,6 +104,8 @@ constexpr auto kFields = std::to_array<SceneField>({
 const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
 const std::vector<std::string> kPrecisionNames{"double", "float"};          // in the enum's order
 const std::vector<std::string> kOutputSpaceNames{"file", "si"};             // in the enum's order
+
+const std::vector<std::string> kSwitchNames{"off", "on"};  // in the enum's order
 
 std::vector<std::string> model_names() {
   std::vector<std::string> names;
@@ -153,6 +169,18 @@ void check_model(const std::string& name, const std::string& where) {
   throw ConfigError(fmt::format("{}: got '{}', expected one of {}; hint: {}", where, name,
                                 fmt::join(names, ", "),
                                 guess.empty() ? std::string(fem::kDefaultModel) : guess));
+}
+
+/// Names with commas between; nothing: no name.
+std::vector<std::string> parse_list(std::string_view text) {
+  std::vector<std::string> names;
+  while (!text.empty()) {
+    const auto comma = text.find(',');
+    const std::string_view name = trimmed(text.substr(0, comma));
+    if (!name.empty()) names.emplace_back(name);
+    text.remove_prefix(comma == std::string_view::npos ? text.size() : comma + 1);
+  }
+  return names;
 }
 
 FrameRange parse_frames(std::string_view text, const std::string& where) {
@@ -248,6 +276,8 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
           [](std::string Scene::*) {},
           [](PathMember) {},
           [&](ModelMember member) { check_model(scene.*(member.name), where); },
+          [](std::vector<std::string> Scene::*) {},
+          [](Switch Scene::*) {},
           [](Integrator Scene::*) {},
           [](Precision Scene::*) {},
           [](OutputSpace Scene::*) {},
@@ -276,31 +306,34 @@ void set_from_text(Scene& scene, const SceneField& field, std::string_view text,
     if (!value) refuse(field, quoted(text), "a number, " + range_text(field), where);
     return *value;
   };
-  std::visit(Overloaded{
-                 [&](bool Scene::*member) { scene.*member = true; },
-                 [&](std::string Scene::*member) { scene.*member = text; },
-                 [&](PathMember member) { scene.*(member.path) = text; },
-                 [&](ModelMember member) { scene.*(member.name) = text; },
-                 [&](int Scene::*member) {
-                   const auto value = parse_int(text);
-                   if (!value) refuse(field, quoted(text), "a whole number, " + range_text(field), where);
-                   scene.*member = *value;
-                 },
-                 [&](double Scene::*member) { scene.*member = number(); },
-                 [&](std::optional<double> Scene::*member) { scene.*member = number(); },
-                 [&](Eigen::Vector3d Scene::*member) { scene.*member = parse_vector(field, text, where); },
-                 [&](std::optional<FrameRange> Scene::*member) { scene.*member = parse_frames(text, where); },
-                 [&](Integrator Scene::*member) {
-                   scene.*member = parse_choice<Integrator>(kIntegratorNames, text, where);
-                 },
-                 [&](Precision Scene::*member) {
-                   scene.*member = parse_choice<Precision>(kPrecisionNames, text, where);
-                 },
-                 [&](OutputSpace Scene::*member) {
-                   scene.*member = parse_choice<OutputSpace>(kOutputSpaceNames, text, where);
-                 },
-             },
-             field.member);
+  std::visit(
+      Overloaded{
+          [&](bool Scene::*member) { scene.*member = true; },
+          [&](std::string Scene::*member) { scene.*member = text; },
+          [&](PathMember member) { scene.*(member.path) = text; },
+          [&](ModelMember member) { scene.*(member.name) = text; },
+          [&](std::vector<std::string> Scene::*member) { scene.*member = parse_list(text); },
+          [&](Switch Scene::*member) { scene.*member = parse_choice<Switch>(kSwitchNames, text, where); },
+          [&](int Scene::*member) {
+            const auto value = parse_int(text);
+            if (!value) refuse(field, quoted(text), "a whole number, " + range_text(field), where);
+            scene.*member = *value;
+          },
+          [&](double Scene::*member) { scene.*member = number(); },
+          [&](std::optional<double> Scene::*member) { scene.*member = number(); },
+          [&](Eigen::Vector3d Scene::*member) { scene.*member = parse_vector(field, text, where); },
+          [&](std::optional<FrameRange> Scene::*member) { scene.*member = parse_frames(text, where); },
+          [&](Integrator Scene::*member) {
+            scene.*member = parse_choice<Integrator>(kIntegratorNames, text, where);
+          },
+          [&](Precision Scene::*member) {
+            scene.*member = parse_choice<Precision>(kPrecisionNames, text, where);
+          },
+          [&](OutputSpace Scene::*member) {
+            scene.*member = parse_choice<OutputSpace>(kOutputSpaceNames, text, where);
+          },
+      },
+      field.member);
   check_field(scene, field, where);
 }
 
@@ -314,6 +347,10 @@ std::string flag_text(const Scene& scene, const SceneField& field) {
           [&](std::string Scene::*member) { return scene.*member; },
           [&](PathMember member) { return scene.*(member.path); },
           [&](ModelMember member) { return scene.*(member.name); },
+          [&](std::vector<std::string> Scene::*member) {
+            return fmt::format("{}", fmt::join(scene.*member, ","));
+          },
+          [&](Switch Scene::*member) { return choice(kSwitchNames, scene.*member); },
           [&](int Scene::*member) { return fmt::format("{}", scene.*member); },
           [&](double Scene::*member) { return number_text(scene.*member); },
           [&](std::optional<double> Scene::*member) {
@@ -337,6 +374,7 @@ std::string toml_value(const Scene& scene, const SceneField& field) {
   return std::visit(
       Overloaded{
           [&](bool Scene::*) { return text; },
+          [&](std::vector<std::string> Scene::*member) { return toml_quoted(scene.*member, field.key); },
           [&](int Scene::*) { return text; },
           [&](double Scene::*) { return toml_number(text); },
           [&](std::optional<double> Scene::*) { return toml_number(text); },

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "tools/scene.h"
 
@@ -22,10 +23,11 @@ struct ModelMember {
   std::string Scene::*name;
 };
 
-using SceneMember = std::variant<bool Scene::*, int Scene::*, double Scene::*, std::optional<double> Scene::*,
-                                 std::string Scene::*, PathMember, ModelMember, Eigen::Vector3d Scene::*,
-                                 std::optional<FrameRange> Scene::*, Integrator Scene::*, Precision Scene::*,
-                                 OutputSpace Scene::*>;
+using SceneMember =
+    std::variant<bool Scene::*, int Scene::*, double Scene::*, std::optional<double> Scene::*,
+                 std::string Scene::*, PathMember, ModelMember, std::vector<std::string> Scene::*,
+                 Switch Scene::*, Eigen::Vector3d Scene::*, std::optional<FrameRange> Scene::*,
+                 Integrator Scene::*, Precision Scene::*, OutputSpace Scene::*>;
 
 /// An interval of numbers.
 struct Range {
@@ -48,6 +50,13 @@ struct SceneField {
   std::string_view unit = {};
   std::string_view hint = {};  ///< a value that is right for most.
 };
+
+/// A key of [[material]] and its range.
+struct MaterialValue {
+  const SceneField* field = nullptr;
+  std::optional<double> BoneMaterial::*member = nullptr;
+};
+std::vector<MaterialValue> material_values();
 
 /// In the order of a printed scene.
 std::span<const SceneField> scene_fields();

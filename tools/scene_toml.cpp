@@ -139,6 +139,10 @@ class SceneReader : public detail::TomlReader {
                    const std::string& where) {
     scene_.*member = string(node, where);
   }
+  void read_member(const SceneField&, std::vector<std::string> Scene::*member, const toml::node& node,
+                   const std::string& where) {
+    scene_.*member = strings(node, where);
+  }
   void read_member(const SceneField&, PathMember member, const toml::node& node, const std::string& where) {
     const std::string path = string(node, where);
     scene_.*(member.path) = path.empty() ? "" : (directory_ / path).string();
@@ -155,19 +159,17 @@ class SceneReader : public detail::TomlReader {
 
   BoneMaterial material(const toml::table& table, const std::string& where) const {
     BoneMaterial material;
-    const auto value = [&](const char* key, std::optional<double>& member) {
-      return Entry{key, [this, key, &member](const toml::node& node, const std::string& at) {
-                     const SceneField& field = *find_scene_field(key);
-                     member = number(node, at, range_text(field));
-                     check_number(field, *member, at);
-                   }};
-    };
-    read_table(table, where,
-               {{"bones",
-                 [&](const toml::node& node, const std::string& at) { material.bones = strings(node, at); }},
-                value("young", material.young),
-                value("poisson", material.poisson),
-                value("density", material.density)});
+    std::vector<Entry> entries{{"bones", [&](const toml::node& node, const std::string& at) {
+                                  material.bones = strings(node, at);
+                                }}};
+    for (const MaterialValue& value : material_values()) {
+      entries.push_back({std::string(value.field->key),
+                         [this, value, &material](const toml::node& node, const std::string& at) {
+                           material.*value.member = number(node, at, range_text(*value.field));
+                           check_number(*value.field, *(material.*value.member), at);
+                         }});
+    }
+    read_table(table, where, entries);
     if (material.bones.empty()) {
       throw ConfigError(
           fmt::format("{}: {}: no bones, expected at least one name or pattern; hint: bones = [\"tail*\"]",

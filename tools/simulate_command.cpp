@@ -30,9 +30,11 @@ namespace {
 
 using lattice::Points;
 
+constexpr const char* kPicture = "preview.png";
+
 /// Everything that a run may write into its folder.
 const std::vector<std::string> kOutputs{"skin.obj",    "skin.pc2",    "skin.json",
-                                        "lattice.vtu", "report.json", "preview.png"};
+                                        "lattice.vtu", "report.json", kPicture};
 
 void talk(const std::string& line) { std::cerr << line << '\n'; }
 
@@ -232,6 +234,15 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
   return preview;
 }
 
+void write_picture(const Character& character, const std::vector<assets::PreviewFrame>& frames,
+                   const std::string& file) {
+  assets::PreviewOptions picture;
+  picture.caption =
+      std::filesystem::path(character.rig.file).stem().string() + ", " + character.the_clip().name;
+  picture.colours = assets::role_colours(character.rig);
+  assets::write_preview(file, all_triangles(character.rig), frames, picture);
+}
+
 void simulate(const Scene& scene) {
   std::unique_ptr<tbb::global_control> threads;
   if (scene.threads > 0) {
@@ -272,11 +283,7 @@ void simulate(const Scene& scene) {
   const auto preview =
       run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
   lap("simulate and write frames");
-  assets::PreviewOptions picture;
-  picture.caption =
-      std::filesystem::path(character.rig.file).stem().string() + ", " + character.the_clip().name;
-  picture.colours = assets::role_colours(character.rig);
-  assets::write_preview(out.file("preview.png"), all_triangles(character.rig), preview, picture);
+  if (scene.preview == Switch::On) write_picture(character, preview, out.file(kPicture));
   lap("preview");
   report.counts = simulation.counts();
   write_companions(scene, character, layout, report, body, frames, out);
@@ -288,8 +295,10 @@ void simulate(const Scene& scene) {
   for (const auto& phase : report.times) total += phase.second;
   talk(fmt::format("wrote {} frames of {} vertices to {} in {:.1f} s:", frames.last - frames.first + 1,
                    layout.rig_vertex.size(), scene.output, total));
-  for (const std::string& name : kOutputs) talk("  " + scene.output + "/" + name);
-  talk("look at " + scene.output + "/preview.png");
+  for (const std::string& name : kOutputs) {
+    if (name != kPicture || scene.preview == Switch::On) talk("  " + scene.output + "/" + name);
+  }
+  if (scene.preview == Switch::On) talk("look at " + scene.output + "/" + kPicture);
 }
 
 }  // namespace

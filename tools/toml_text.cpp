@@ -26,4 +26,10 @@ std::string toml_quoted(const std::string& text, std::string_view key) {
   return literal + '"';
 }
 
+std::string toml_quoted(const std::vector<std::string>& texts, std::string_view key) {
+  std::string list;
+  for (const std::string& text : texts) list += (list.empty() ? "" : ", ") + toml_quoted(text, key);
+  return "[" + list + "]";
+}
+
 }  // namespace sinew::tools

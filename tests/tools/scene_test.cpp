@@ -57,6 +57,16 @@ class SceneFile : public testing::Test {
   fs::path before_, directory_;
 };
 
+TEST_F(SceneFile, ReadsWhichBonesTakePartAndHowLargeCellsAre) {
+  const Scene scene =
+      read("bones_include = [\"arm*\", \"leg_?\"]\nbones_exclude = [\"toe*\"]\ncell_size = 0.05");
+  EXPECT_EQ(scene.bones_include, (std::vector<std::string>{"arm*", "leg_?"}));
+  EXPECT_EQ(scene.bones_exclude, std::vector<std::string>{"toe*"});
+  EXPECT_EQ(scene.cell_size, 0.05);
+  EXPECT_EQ(refusal("bones_include = \"arm\""),
+            "scene.toml:1: bones_include: got a string, expected an array of strings");
+}
+
 TEST_F(SceneFile, KeepsTheDefaultsOfKeysLeftOut) { EXPECT_EQ(read(""), Scene{}); }
 
 TEST_F(SceneFile, SetsEveryKey) {
@@ -68,6 +78,9 @@ json = true
 clip = "walk"
 lattice = "hero.vtu"
 cells = 500
+tip_bones = "off"
+symmetry = "off"
+preview = "off"
 levels = 2
 young = 20000
 poisson = 0.49
@@ -104,6 +117,7 @@ density = 900
   expected.clip = "walk";
   expected.lattice = "hero.vtu";
   expected.cells = 500;
+  expected.tip_bones = expected.symmetry = expected.preview = Switch::Off;
   expected.levels = 2;
   expected.young = 20000.0;
   expected.poisson = 0.49;
@@ -193,7 +207,7 @@ TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
 
 TEST_F(SceneFile, ListsTheKnownKeysWhereNoneIsNear) {
   const std::string message = refusal("temperature = 3");
-  EXPECT_EQ(message.rfind("scene.toml:1: temperature: unknown key; hint: known are bone, cells, clip,", 0),
+  EXPECT_EQ(message.rfind("scene.toml:1: temperature: unknown key; hint: known are bone, bones_exclude,", 0),
             0u)
       << message;
 }
@@ -263,6 +277,13 @@ Scene random_scene(std::mt19937_64& rng) {
   if (index(2) == 1) scene.clip = text();
   if (index(2) == 1) scene.lattice = text();
   scene.cells = 20 + index(1000);
+  const bool built = scene.lattice.empty();
+  if (built && index(2) == 1) scene.cell_size = 0.01 + unit();
+  if (built && index(2) == 1) scene.bones_include = {"arm*", "a \"leg\""};
+  if (built && index(2) == 1) scene.bones_exclude = {"toe_?"};
+  scene.tip_bones = index(2) == 1 ? Switch::On : Switch::Off;
+  scene.symmetry = index(2) == 1 ? Switch::On : Switch::Off;
+  scene.preview = index(2) == 1 ? Switch::On : Switch::Off;
   scene.levels = index(4);
   if (index(2) == 1) scene.young = 1.0 + 1e5 * unit();
   scene.poisson = -0.9 + 1.39 * unit();
@@ -412,7 +433,7 @@ TEST(SceneMaterials, RefuseAPatternThatFitsNoBone) {
     material_of_bone(scene, "r.glb", {"hip", "tail"});
     FAIL() << "accepted";
   } catch (const assets::InputError& e) {
-    EXPECT_STREQ(e.what(), "r.glb: material 2: no bone is named 'tial*', expected one of hip, tail");
+    EXPECT_STREQ(e.what(), "r.glb: material 2: no bone is named 'tial*'; hint: did you mean tail*?");
   }
 }
 
