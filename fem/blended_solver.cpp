@@ -11,28 +11,15 @@
 #include <tbb/parallel_for.h>
 
 #include "fem/detail/coordinates.h"
+#include "fem/detail/couples.h"
 
 namespace sinew::fem {
 namespace {
 
 using detail::Coordinates;
+using Inputs = detail::CoupleInputs;
 using lattice::Points;
 using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
-
-/// Four lanes, of which three are used: the processor then works on pairs.
-using Lanes = Eigen::Vector4d;
-
-/// What M, K and P are applied to, side by side because one pass over the matrices applies all three.
-struct Inputs {
-  Lanes inertia = Lanes::Zero(), elastic = Lanes::Zero(), tie = Lanes::Zero();
-};
-
-/// K, M and P of one pair of leaf vertices: three columns of K, with M and P in the spare lanes.
-struct Couple {
-  Eigen::Matrix<double, 4, 3> stiffness;
-  double mass() const { return stiffness(3, 0); }
-  double tie() const { return stiffness(3, 1); }
-};
 
 /// Everything of one region that does not change with the step size.
 struct RegionSystem {
@@ -42,7 +29,8 @@ struct RegionSystem {
   std::vector<int>
       vertices;  ///< leaf vertices: rows (where an unknown function lives) first, then their neighbours.
   int num_rows = 0;
-  RowSparse values;            ///< vertices x functions (local).
+  RowSparse values;                      ///< vertices x functions (local).
+  bool values_are_coefficients = false;  ///< `values` is the identity: true in the nodal basis.
   RowSparse rows_to_unknown;   ///< num_unknown x num_rows: transpose of the unknown part of `values`.
   std::vector<int> row_start;  ///< of the rows' neighbours,
   std::vector<int> column;     ///< as local vertices;
@@ -66,7 +54,7 @@ struct BlendedSolver::Impl {
   SolverOptions options;
   Coordinates coordinates;
   std::vector<RegionSystem> systems;
-  std::vector<Couple> couples;  ///< entries of body->matrices, packed for the step.
+  detail::Couples couples;
   /// Systems that have a leaf vertex among their rows: (system, row).
   std::vector<std::vector<std::pair<int, int>>> rows_of_vertex;
   std::map<std::pair<double, Integrator>, std::vector<Factor>> factors;
@@ -174,6 +162,10 @@ RegionSystem BlendedSolver::Impl::build_system(const Region& region) const {
   system.values.resize(static_cast<Eigen::Index>(system.vertices.size()),
                        static_cast<Eigen::Index>(system.functions.size()));
   system.values.setFromTriplets(triplets.begin(), triplets.end());
+  RowSparse identity(system.values.rows(), system.values.rows());
+  identity.setIdentity();
+  system.values_are_coefficients = system.values.rows() == system.values.cols() &&
+                                   RowSparse(system.values - identity).squaredNorm() == 0.0;
   system.rows_to_unknown.resize(system.num_unknown, system.num_rows);
   system.rows_to_unknown.setFromTriplets(transposed.begin(), transposed.end());
   for (int a : region.vertices) {
@@ -221,12 +213,7 @@ void BlendedSolver::Impl::build_systems() {
           static_cast<int>(i), r);
     }
   }
-  const LeafMatrices& matrices = body->matrices;
-  couples.resize(matrices.column.size());
-  for (std::size_t e = 0; e < couples.size(); ++e) {
-    couples[e].stiffness.topRows<3>() = matrices.stiffness[e];
-    couples[e].stiffness.row(3) << matrices.mass[e], matrices.tie[e], 0.0;
-  }
+  couples = detail::Couples(body->matrices);
 }
 
 BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
@@ -273,6 +260,24 @@ Eigen::SparseMatrix<double> BlendedSolver::Impl::matrix_of(const RegionSystem& s
   return basis.transpose() * (nodal * basis);
 }
 
+namespace {
+
+/// Flags of the system's rows whose solution the blended vertices read; the rest, most of the ring, is
+/// discarded.
+std::vector<std::uint8_t> wanted_rows(const RegionSystem& system) {
+  std::vector<std::uint8_t> wanted(static_cast<std::size_t>(3 * system.num_unknown), 0);
+  for (int vertex : system.blended) {
+    if (vertex < 0) continue;
+    for (RowSparse::InnerIterator it(system.values, vertex); it; ++it) {
+      if (it.col() >= system.num_unknown) continue;
+      for (int c = 0; c < 3; ++c) wanted[static_cast<std::size_t>(3 * it.col() + c)] = 1;
+    }
+  }
+  return wanted;
+}
+
+}  // namespace
+
 Factor::Report BlendedSolver::prepare(double h, Integrator integrator) {
   auto& factors = impl_->factors[{h, integrator}];
   if (!factors.empty() || impl_->systems.empty()) {
@@ -288,7 +293,9 @@ Factor::Report BlendedSolver::prepare(double h, Integrator integrator) {
     if (impl_->systems[i].num_unknown == 0) {
       reports[i].ok = true;
     } else {
-      reports[i] = factors[i].factorise(impl_->matrix_of(impl_->systems[i], c), impl_->options.precision);
+      const RegionSystem& system = impl_->systems[i];
+      reports[i] =
+          factors[i].factorise(impl_->matrix_of(system, c), impl_->options.precision, wanted_rows(system));
     }
   });
   for (std::size_t i = 0; i < reports.size(); ++i) {
@@ -318,7 +325,7 @@ struct BlendedSolver::Impl::StepData {
 
 namespace {
 
-Lanes lanes(const Eigen::Vector3d& v) { return {v[0], v[1], v[2], 0.0}; }
+Eigen::Vector4d lanes(const Eigen::Vector3d& v) { return {v[0], v[1], v[2], 0.0}; }
 
 }  // namespace
 
@@ -341,6 +348,7 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
     return map.linear() * x + is_value * map.translation();
   };
 
+  std::vector<Inputs>& coefficients = s.values_are_coefficients ? s.inputs : s.coefficients;
   for (std::size_t k = 0; k < s.functions.size(); ++k) {
     const int f = s.functions[k];
     const bool known = static_cast<int>(k) >= s.num_unknown;
@@ -367,9 +375,10 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
     const Eigen::Vector3d v_frame = (carried - x_h) / (step.stage.kappa * step.h);
     Eigen::Vector3d inertia = step.v_h.row(f).transpose() + (th * step.alpha) * v_frame;
     if (known) inertia -= (1.0 + th * step.alpha) * step.v_known.row(f).transpose();
-    s.coefficients[k] = {lanes(to_local * inertia), lanes(-th * ((1.0 + b) * u_end - b * u_past)),
-                         lanes(-th * p)};
+    coefficients[k] = {lanes(to_local * inertia), lanes(-th * ((1.0 + b) * u_end - b * u_past)),
+                       lanes(-th * p)};
   }
+  if (s.values_are_coefficients) return;
   for (std::size_t r = 0; r < s.inputs.size(); ++r) {
     Inputs sum;
     for (RowSparse::InnerIterator it(s.values, static_cast<Eigen::Index>(r)); it; ++it) {
@@ -389,15 +398,8 @@ void BlendedSolver::Impl::apply_matrices(int vertex) {
       static_cast<std::size_t>(body->matrices.row_start[static_cast<std::size_t>(vertex) + 1]) - first;
   for (const auto& [system, row] : rows_of_vertex[static_cast<std::size_t>(vertex)]) {
     RegionSystem& s = systems[static_cast<std::size_t>(system)];
-    const int* column = s.column.data() + s.row_start[static_cast<std::size_t>(row)];
-    Lanes sum = Lanes::Zero();
-    for (std::size_t k = 0; k < count; ++k) {
-      const Couple& couple = couples[first + k];
-      const Inputs& in = s.inputs[static_cast<std::size_t>(column[k])];
-      sum += couple.mass() * in.inertia + couple.tie() * in.tie;
-      for (int j = 0; j < 3; ++j) sum += in.elastic[j] * couple.stiffness.col(j);
-    }
-    s.row_force.row(row) = sum.head<3>().transpose();
+    const int* columns = s.column.data() + s.row_start[static_cast<std::size_t>(row)];
+    s.row_force.row(row) = couples.apply(first, {columns, count}, s.inputs.data()).transpose();
   }
 }
 

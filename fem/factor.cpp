@@ -9,66 +9,17 @@
 #include <cholmod.h>
 #include <omp.h>
 
+#include "fem/detail/panels.h"
+
 namespace sinew::fem {
-namespace {
-
-/// A supernode: columns first .. first+columns-1 of L as one dense panel, column-major, `rows` high; the top
-/// square is lower triangular, the rows below are scattered to `indices`.
-struct Panel {
-  int first = 0;
-  int columns = 0;
-  int rows = 0;
-  std::size_t values = 0;   ///< offset of the panel's values.
-  std::size_t indices = 0;  ///< offset of its row indices (the first `columns` are its own).
-};
-
-template <class Scalar>
-using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
-template <class Scalar>
-using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
-
-/// L y = b, then L^T x = y, panel by panel.
-template <class Scalar>
-void solve_panels(const std::vector<Panel>& panels, const std::vector<int>& row_index, const Scalar* values,
-                  Scalar* x, Vector<Scalar>& gathered) {
-  for (const Panel& p : panels) {
-    const int below = p.rows - p.columns;
-    const Eigen::Map<const Matrix<Scalar>, 0, Eigen::OuterStride<>> panel(
-        values + p.values, p.rows, p.columns, Eigen::OuterStride<>(p.rows));
-    Eigen::Map<Vector<Scalar>> top(x + p.first, p.columns);
-    panel.topRows(p.columns).template triangularView<Eigen::Lower>().solveInPlace(top);
-    if (below == 0) continue;
-    gathered.head(below).noalias() = panel.bottomRows(below) * top;
-    const int* rows = row_index.data() + p.indices + static_cast<std::size_t>(p.columns);
-    for (int i = 0; i < below; ++i) x[rows[i]] -= gathered[i];
-  }
-  for (auto it = panels.rbegin(); it != panels.rend(); ++it) {
-    const Panel& p = *it;
-    const int below = p.rows - p.columns;
-    const Eigen::Map<const Matrix<Scalar>, 0, Eigen::OuterStride<>> panel(
-        values + p.values, p.rows, p.columns, Eigen::OuterStride<>(p.rows));
-    Eigen::Map<Vector<Scalar>> top(x + p.first, p.columns);
-    if (below > 0) {
-      const int* rows = row_index.data() + p.indices + static_cast<std::size_t>(p.columns);
-      for (int i = 0; i < below; ++i) gathered[i] = x[rows[i]];
-      top.noalias() -= panel.bottomRows(below).transpose() * gathered.head(below);
-    }
-    panel.topRows(p.columns).template triangularView<Eigen::Lower>().transpose().solveInPlace(top);
-  }
-}
-
-}  // namespace
-
 struct Factor::Impl {
   int size = 0;
   Eigen::VectorXd
       scale;  ///< 1 / sqrt(diagonal): Jacobi scaling, so a nearly empty cell cannot spoil a float.
   std::vector<int> permutation;  ///< row of A at position i of the factor.
-  std::vector<Panel> panels;
-  std::vector<int> row_index;
-  std::vector<double> values;
-  std::vector<float> float_values;
-  int largest_panel = 0;
+  Precision precision = Precision::Double;
+  detail::Panels<double> panels;
+  detail::Panels<float> float_panels;
 };
 
 Factor::Factor() = default;
@@ -78,7 +29,10 @@ Factor& Factor::operator=(Factor&&) noexcept = default;
 
 int Factor::size() const { return impl_ ? impl_->size : 0; }
 std::size_t Factor::num_nonzeros() const {
-  return impl_ ? impl_->values.size() + impl_->float_values.size() : 0;
+  return impl_ ? impl_->panels.num_values() + impl_->float_panels.num_values() : 0;
+}
+std::size_t Factor::num_read() const {
+  return impl_ ? impl_->panels.num_values_read() + impl_->float_panels.num_values_read() : 0;
 }
 
 namespace {
@@ -136,9 +90,33 @@ void factorise_numbers(cholmod_sparse& matrix, cholmod_factor* factor, cholmod_c
   omp_set_max_active_levels(levels);
 }
 
+/// The supernodes of CHOLMOD's factor, which must outlive the result. `wanted`: rows of A, all where empty.
+std::vector<detail::Supernode> supernodes_of(const cholmod_factor& factor,
+                                             std::span<const std::uint8_t> wanted) {
+  const int* permutation = static_cast<const int*>(factor.Perm);
+  const int* super = static_cast<const int*>(factor.super);
+  const int* pi = static_cast<const int*>(factor.pi);
+  const int* px = static_cast<const int*>(factor.px);
+  std::vector<detail::Supernode> supernodes;
+  for (std::size_t k = 0; k < factor.nsuper; ++k) {
+    detail::Supernode s;
+    s.first = super[k];
+    s.columns = super[k + 1] - super[k];
+    s.rows = pi[k + 1] - pi[k];
+    s.values = static_cast<const double*>(factor.x) + px[k];
+    s.row_indices = static_cast<const int*>(factor.s) + pi[k];
+    s.wanted =
+        wanted.empty() || std::any_of(permutation + super[k], permutation + super[k + 1],
+                                      [&](int row) { return wanted[static_cast<std::size_t>(row)] != 0; });
+    supernodes.push_back(s);
+  }
+  return supernodes;
+}
+
 }  // namespace
 
-Factor::Report Factor::factorise(const Eigen::SparseMatrix<double>& matrix, Precision precision) {
+Factor::Report Factor::factorise(const Eigen::SparseMatrix<double>& matrix, Precision precision,
+                                 std::span<const std::uint8_t> wanted) {
   auto impl = std::make_unique<Impl>();
   impl->size = static_cast<int>(matrix.rows());
   const Eigen::VectorXd diagonal = matrix.diagonal();
@@ -171,26 +149,12 @@ Factor::Report Factor::factorise(const Eigen::SparseMatrix<double>& matrix, Prec
     report.ok = true;
     const int* permutation = static_cast<const int*>(factor->Perm);
     impl->permutation.assign(permutation, permutation + factor->n);
-    const int* super = static_cast<const int*>(factor->super);
-    const int* pi = static_cast<const int*>(factor->pi);
-    const int* px = static_cast<const int*>(factor->px);
-    const int* s = static_cast<const int*>(factor->s);
-    impl->row_index.assign(s, s + factor->ssize);
-    for (std::size_t k = 0; k < factor->nsuper; ++k) {
-      Panel p;
-      p.first = super[k];
-      p.columns = super[k + 1] - super[k];
-      p.rows = pi[k + 1] - pi[k];
-      p.values = static_cast<std::size_t>(px[k]);
-      p.indices = static_cast<std::size_t>(pi[k]);
-      impl->largest_panel = std::max(impl->largest_panel, p.rows);
-      impl->panels.push_back(p);
-    }
-    const double* x = static_cast<const double*>(factor->x);
+    const std::vector<detail::Supernode> supernodes = supernodes_of(*factor, wanted);
+    impl->precision = precision;
     if (precision == Precision::Double) {
-      impl->values.assign(x, x + factor->xsize);
+      impl->panels = detail::Panels<double>(impl->size, supernodes);
     } else {
-      impl->float_values.assign(x, x + factor->xsize);
+      impl->float_panels = detail::Panels<float>(impl->size, supernodes);
     }
   }
   cholmod_free_factor(&factor, &workspace.common);
@@ -200,35 +164,23 @@ Factor::Report Factor::factorise(const Eigen::SparseMatrix<double>& matrix, Prec
 
 void Factor::solve(Eigen::Ref<Eigen::VectorXd> b, Eigen::VectorXd& workspace) const {
   const Impl& f = *impl_;
+  const auto row = [&](Eigen::Index i) { return f.permutation[static_cast<std::size_t>(i)]; };
   const auto n = static_cast<Eigen::Index>(f.size);
-  if (workspace.size() < n + f.largest_panel) workspace.resize(n + f.largest_panel);
-  if (!f.values.empty()) {
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const int row = f.permutation[static_cast<std::size_t>(i)];
-      workspace[i] = f.scale[row] * b[row];
-    }
-    Eigen::VectorXd gathered(f.largest_panel);
-    solve_panels<double>(f.panels, f.row_index, f.values.data(), workspace.data(), gathered);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const int row = f.permutation[static_cast<std::size_t>(i)];
-      b[row] = f.scale[row] * workspace[i];
-    }
+  if (f.precision == Precision::Double) {
+    if (workspace.size() < n + f.panels.work_size()) workspace.resize(n + f.panels.work_size());
+    for (Eigen::Index i = 0; i < n; ++i) workspace[i] = f.scale[row(i)] * b[row(i)];
+    f.panels.solve(workspace.data(), workspace.data() + n);
+    for (Eigen::Index i = 0; i < n; ++i) b[row(i)] = f.scale[row(i)] * workspace[i];
     return;
   }
-  Eigen::VectorXf x(n), gathered(f.largest_panel);
+  Eigen::VectorXf x(n + f.float_panels.work_size());
   // Norm one: a small right-hand side must not fall among float's denormals.
   double norm = 0.0;
   for (Eigen::Index i = 0; i < n; ++i) norm = std::max(norm, std::abs(f.scale[i] * b[i]));
   if (norm == 0.0) return b.setZero(), void();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const int row = f.permutation[static_cast<std::size_t>(i)];
-    x[i] = static_cast<float>(f.scale[row] * b[row] / norm);
-  }
-  solve_panels<float>(f.panels, f.row_index, f.float_values.data(), x.data(), gathered);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const int row = f.permutation[static_cast<std::size_t>(i)];
-    b[row] = f.scale[row] * norm * static_cast<double>(x[i]);
-  }
+  for (Eigen::Index i = 0; i < n; ++i) x[i] = static_cast<float>(f.scale[row(i)] * b[row(i)] / norm);
+  f.float_panels.solve(x.data(), x.data() + n);
+  for (Eigen::Index i = 0; i < n; ++i) b[row(i)] = f.scale[row(i)] * norm * static_cast<double>(x[i]);
 }
 
 }  // namespace sinew::fem

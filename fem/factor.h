@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 
 #include <Eigen/SparseCore>
@@ -12,8 +14,8 @@ namespace sinew::fem {
 enum class Precision { Double, Float };
 
 /// Sparse Cholesky factor of a symmetric positive definite matrix: factored once by CHOLMOD (supernodal,
-/// METIS), kept as our own dense panels and solved with them, so that one factor can be read by any number of
-/// threads.
+/// METIS), packed into our own dense panels and solved with them, so that one factor can be read by any
+/// number of threads.
 class Factor {
  public:
   Factor();
@@ -28,16 +30,22 @@ class Factor {
     std::string message;  ///< one sentence.
   };
 
-  /// Factors `matrix`; only the lower triangle is read. Replaces what was there.
+  /// Factors `matrix`; only the lower triangle is read. Replaces what was there. `wanted`: rows in which
+  /// solutions are asked for, one flag per row; empty: all.
   [[nodiscard]] Report factorise(const Eigen::SparseMatrix<double>& matrix,
-                                 Precision precision = Precision::Double);
+                                 Precision precision = Precision::Double,
+                                 std::span<const std::uint8_t> wanted = {});
 
-  /// Solves A x = b in place; `workspace` is resized as needed. Thread-safe: the factor is only read.
+  /// Solves A x = b in place. In rows that are not wanted the result is finite but undefined: the backward
+  /// sweep leaves out what no wanted row depends on. Wanted rows have the same bits whatever else is wanted.
+  /// `workspace` is resized as needed. Thread-safe: the factor is only read.
   void solve(Eigen::Ref<Eigen::VectorXd> b, Eigen::VectorXd& workspace) const;
 
   int size() const;
   /// Entries of the factor's panels, padding included.
   std::size_t num_nonzeros() const;
+  /// Entries that one solve reads: all forward, and backward those that wanted rows depend on.
+  std::size_t num_read() const;
 
  private:
   struct Impl;

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "fem/detail/lanes.h"
+#include "fem/leaf_matrices.h"
+
+/// M, K and P of a body, packed for the one pass over all three that a step makes.
+namespace sinew::fem::detail {
+
+/// What M, K and P are applied to at one vertex; four lanes each, of which three are used.
+struct CoupleInputs {
+  Eigen::Vector4d inertia = Eigen::Vector4d::Zero();
+  Eigen::Vector4d elastic = Eigen::Vector4d::Zero();
+  Eigen::Vector4d tie = Eigen::Vector4d::Zero();
+};
+
+/// Entry e couples two leaf vertices, as in LeafMatrices. Always in double: rows of K sum to zero, and in
+/// float they would not by so much that a stiff bar is 0.3 mm off.
+class Couples {
+ public:
+  Couples() = default;
+  explicit Couples(const LeafMatrices& matrices);
+
+  /// sum over k of M inertia + K elastic + P tie with entry first + k and inputs[columns[k]].
+  Eigen::Vector3d apply(std::size_t first, std::span<const int> columns, const CoupleInputs* inputs,
+                        Code code = best_code()) const;
+
+ private:
+  /// Twelve numbers per entry: the three columns of K with M, P and nothing below them.
+  std::vector<double> values_;
+};
+
+}  // namespace sinew::fem::detail
