@@ -24,6 +24,19 @@ std::array<double, 8> gauss_weights(const lattice::HexCorners& corners, const la
   return weights;
 }
 
+CellGeometry cell_geometry(const lattice::HexCorners& corners, const lattice::FillFractions& fill) {
+  CellGeometry geometry;
+  geometry.weights = gauss_weights(corners, fill);
+  for (int q = 0; q < 8; ++q) {
+    const auto i = static_cast<std::size_t>(q);
+    const Eigen::Vector3d xi = gauss_point(q);
+    geometry.gradients[i] =
+        lattice::trilinear_gradients(xi) * lattice::trilinear_jacobian(corners, xi).inverse();
+    geometry.volume += geometry.weights[i];
+  }
+  return geometry;
+}
+
 CellStiffness cell_stiffness(const lattice::HexCorners& corners, const lattice::FillFractions& fill,
                              const Material& material) {
   const std::array<double, 8> weights = gauss_weights(corners, fill);

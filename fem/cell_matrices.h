@@ -25,6 +25,19 @@ Eigen::Vector3d gauss_point(int k);
 /// rest. A negative entry means an inverted cell.
 std::array<double, 8> gauss_weights(const lattice::HexCorners& corners, const lattice::FillFractions& fill);
 
+/// Corner positions as columns: the flat vector of a cell, dof 3 * corner + component, is its map.
+using CellPoints = Eigen::Matrix<double, 3, 8>;
+using CellVector = Eigen::Matrix<double, 24, 1>;
+
+/// What a nonlinear energy needs of a cell at rest: deformation gradients are F_q = x gradients[q], x as
+/// CellPoints.
+struct CellGeometry {
+  std::array<lattice::HexGradients, 8> gradients;  ///< g_a at Gauss point q, one row per corner [1/m].
+  std::array<double, 8> weights{};                 ///< gauss_weights [m^3].
+  double volume = 0.0;                             ///< their sum [m^3].
+};
+CellGeometry cell_geometry(const lattice::HexCorners& corners, const lattice::FillFractions& fill);
+
 /// K with mean dilatation [Hughes80]:
 ///   K_ab = sum_q w_q [ mu (g_a.g_b I + g_b g_a^T) - 2 mu/3 g_a g_b^T + kappa_b G_a G_b^T ],
 /// g_a the gradient of hat a at Gauss point q, G_a its mean over the filled part of the cell ([Hughes80]

@@ -41,8 +41,22 @@ struct StageProblem {
   StagePoses poses;
   double h = 0.0;  ///< step [s].
   Integrator integrator = Integrator::Bdf2;
-  Eigen::Vector3d gravity{0, 0, 0};  ///< [m/s^2].
-  bool use_past = false;             ///< histories reach back to state->x_past; else the present alone.
+  Eigen::Vector3d gravity{0, 0, 0};        ///< [m/s^2].
+  const lattice::Points* force = nullptr;  ///< further forces on the leaf vertices [N]; null for none.
+  bool use_past = false;                   ///< histories reach back to state->x_past; else the present alone.
+};
+
+/// A pose in which the flesh is to come to rest.
+struct PoseProblem {
+  const PosedFrames* pose = nullptr;
+  Eigen::Vector3d gravity{0, 0, 0};        ///< [m/s^2].
+  const lattice::Points* force = nullptr;  ///< further forces on the leaf vertices [N]; null for none.
+};
+
+/// Elastic energy and forces of every leaf cell.
+struct CellForces {
+  std::vector<double> energy;     ///< [J].
+  std::vector<CellVector> force;  ///< its gradient by the corners, dof 3 * corner + component [N].
 };
 
 class Model {
@@ -55,6 +69,13 @@ class Model {
   /// v+ [m/s] of all leaf vertices at the end of the stage; those on bones get the velocity that puts them on
   /// the clip. prepare(h, integrator) must have succeeded. `velocity` is untouched unless the report is ok.
   virtual SolveReport solve_stage(const StageProblem& problem, lattice::Points& velocity) = 0;
+
+  /// Puts the flesh where it rests in the pose; `x`: a first guess (num_vertices x 3 [m]) and the result,
+  /// untouched unless the report is ok.
+  virtual SolveReport equilibrate(const PoseProblem& problem, lattice::Points& x) = 0;
+
+  /// What the model's law says of leaf positions x in a pose, without viscosity.
+  virtual CellForces cell_forces(const lattice::Points& x, const PosedFrames& pose) = 0;
 
   virtual SolverCounts counts() const = 0;
 };

@@ -2,8 +2,13 @@
 #include <array>
 
 #include "fem/models/blended.h"
+#include "fem/models/blended_stiffness.h"
+#include "fem/models/corotational.h"
 #include "fem/models/model.h"
+#include "fem/models/neo_hookean.h"
 #include "fem/models/skin.h"
+#include "fem/models/springs.h"
+#include "fem/models/stvk.h"
 
 namespace sinew::fem {
 namespace {
@@ -12,8 +17,17 @@ constexpr bool kDynamic = true, kPlaced = false;
 
 constexpr auto kModels = std::to_array<ModelInfo>({
     {"skin", "free-form deformation: lattice vertices skinned by the bones; no dynamics", kPlaced, make_skin},
+    {"springs", "mass-spring on cell edges and diagonals, matched to E; Poisson's ratio is 1/4", kDynamic,
+     make_springs},
     {"blended", "one prefactored linear system per region, blended by weights; the fast default", kDynamic,
      make_blended},
+    {"blended-stiffness", "one linear system, cells turned by the blended rotation of their bones", kDynamic,
+     make_blended_stiffness},
+    {"corotational", "one linear system, cells turned by their own rotation", kDynamic, make_corotational},
+    {"stvk", "St. Venant-Kirchhoff: finite strain by full Newton; collapses when squeezed to half", kDynamic,
+     make_stvk},
+    {"neo-hookean", "neo-Hookean, safe under inversion, by full Newton: the reference of the others",
+     kDynamic, make_neo_hookean},
 });
 
 }  // namespace

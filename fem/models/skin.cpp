@@ -1,5 +1,6 @@
 #include "fem/models/skin.h"
 
+#include "fem/models/rotated_stiffness.h"
 #include "fem/placement.h"
 
 namespace sinew::fem {
@@ -15,6 +16,16 @@ class Skin final : public Model {
     const double eta_h = stage_of(p.integrator).eta * p.h;
     velocity = (skinned_positions(body_, *p.poses.stage) - *p.x_h) / eta_h;
     return {};
+  }
+
+  SolveReport equilibrate(const PoseProblem& problem, lattice::Points& x) override {
+    x = skinned_positions(body_, *problem.pose);
+    return {};
+  }
+
+  /// As linear flesh would answer in the rotation of its frames.
+  CellForces cell_forces(const lattice::Points& x, const PosedFrames& pose) override {
+    return RotatedStiffness(body_).forces(x, frame_rotations(body_, pose));
   }
 
   SolverCounts counts() const override {

@@ -21,6 +21,10 @@ struct BarOptions {
   fem::Material material{1e5, 0.3, 1000.0};
   fem::Damping damping{0.0, 1.0};
   bool clamped = true;  ///< the face x = min as bone vertices of the one frame.
+  /// Rest points that are bone vertices instead; empty: as `clamped` says.
+  std::function<bool(const Eigen::Vector3d&)> held;
+  /// Moves the vertices of the box before anything else; empty: they stay.
+  std::function<Eigen::Vector3d(const Eigen::Vector3d&)> distort;
   /// Changes the active set; the hierarchy has one level more than `levels` then.
   std::function<void(const lattice::Hierarchy&, lattice::ActiveSet&)> refine;
   /// Fill of the Gauss point at x; full where empty.
@@ -35,6 +39,9 @@ inline fem::Damping rayleigh(double alpha, double beta) {
 inline fem::Body bar_body(const BarOptions& options) {
   lattice::ControlLattice control;
   control.complex = lattice::box_lattice(options.box);
+  for (Eigen::Index a = 0; options.distort && a < control.complex.points.rows(); ++a) {
+    control.complex.points.row(a) = options.distort(control.complex.points.row(a).transpose()).transpose();
+  }
   control.edge_length =
       (options.box.max - options.box.min).cwiseQuotient(options.box.blocks.cast<double>()).maxCoeff();
   lattice::Hierarchy hierarchy(control.complex, std::max(1, options.levels + (options.refine ? 1 : 0)));
@@ -63,9 +70,10 @@ inline fem::Body bar_body(const BarOptions& options) {
   tree.frame_of_joint = {0};
   fem::BoneConstraints bones;
   bones.is_bone.assign(static_cast<std::size_t>(n), 0);
-  for (int a = 0; options.clamped && a < n; ++a) {
+  for (int a = 0; a < n; ++a) {
     const Eigen::Vector3d x = mesh.points.row(a).transpose();
-    if (x[0] > options.box.min[0] + 1e-9) continue;
+    const bool at_face = options.clamped && x[0] <= options.box.min[0] + 1e-9;
+    if (options.held ? !options.held(x) : !at_face) continue;
     bones.is_bone[static_cast<std::size_t>(a)] = 1;
     bones.vertices.push_back({a, 0, -1, 0, 0, x, x, 0.0});
   }

@@ -1,0 +1,243 @@
+#include "fem/models/balance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "fem/placement.h"
+
+namespace sinew::fem {
+
+using lattice::Points;
+
+namespace {
+
+template <class Action>
+void over_vertices(const Body& body, const Action& action) {
+  tbb::parallel_for(tbb::blocked_range<int>(0, body.mesh.num_vertices(), 128),
+                    [&](const tbb::blocked_range<int>& range) {
+                      for (int a = range.begin(); a != range.end(); ++a) action(a);
+                    });
+}
+
+Points tie_targets(const Body& body, const PosedFrames& posed) {
+  Points target = Points::Zero(body.mesh.num_vertices(), 3);
+  for (const Tie& tie : body.ties) {
+    const Eigen::Affine3d& map = posed.frames[static_cast<std::size_t>(tie.frame)].from_rest;
+    const Eigen::Vector3d centre = map * tie.centre_rest;
+    for (std::size_t k = 0; k < tie.vertices.size(); ++k)
+      target.row(tie.vertices[k]) += (map.linear() * tie.first[k] + tie.zeroth[k] * centre).transpose();
+  }
+  return target;
+}
+
+Points weights(const Body& body, const Eigen::Vector3d& gravity, const Points* force) {
+  Points load(body.mesh.num_vertices(), 3);
+  for (int a = 0; a < body.mesh.num_vertices(); ++a)
+    load.row(a) = body.vertex_mass[static_cast<std::size_t>(a)] * gravity.transpose();
+  if (force != nullptr) load += *force;
+  return load;
+}
+
+/// Velocity of the flesh over `elapsed` seconds if it moves with its frames and keeps its velocity relative
+/// to them.
+Points predicted_velocity(const Body& body, const State& state, const StagePoses& poses, double elapsed) {
+  const std::size_t num_frames = body.tree.frames.size();
+  std::vector<Eigen::Affine3d> forward(num_frames), backward(num_frames);
+  std::vector<Eigen::Matrix3d> turn(num_frames);
+  const double past_h = poses.before != nullptr ? poses.now->time - poses.before->time : 0.0;
+  for (std::size_t f = 0; f < num_frames; ++f) {
+    const FrameTransform& now = poses.now->frames[f];
+    forward[f] = poses.stage->frames[f].from_rest * now.to_rest;
+    turn[f] = poses.stage->frames[f].rotation * now.rotation.transpose();
+    if (poses.before != nullptr) backward[f] = poses.before->frames[f].from_rest * now.to_rest;
+  }
+  Points v(body.mesh.num_vertices(), 3);
+  over_vertices(body, [&](int a) {
+    const Eigen::Vector3d x = state.x.row(a).transpose();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+      const auto f = static_cast<std::size_t>(it.col());
+      Eigen::Vector3d velocity = (forward[f] * x - x) / elapsed;
+      if (poses.before != nullptr)
+        velocity += turn[f] * (state.v.row(a).transpose() - (x - backward[f] * x) / past_h);
+      sum += it.value() * velocity;
+    }
+    v.row(a) = sum.transpose();
+  });
+  return v;
+}
+
+}  // namespace
+
+Points carried(const Body& body, const Points& x, const PosedFrames& from, const PosedFrames& to) {
+  std::vector<Eigen::Affine3d> map;
+  for (std::size_t f = 0; f < body.tree.frames.size(); ++f)
+    map.push_back(to.frames[f].from_rest * from.frames[f].to_rest);
+  Points moved(x.rows(), 3);
+  over_vertices(body, [&](int a) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it)
+      sum += it.value() * (map[static_cast<std::size_t>(it.col())] * x.row(a).transpose());
+    moved.row(a) = sum.transpose();
+  });
+  return moved;
+}
+
+Balance stage_balance(const Body& body, const StageProblem& p) {
+  const Stage stage = stage_of(p.integrator);
+  const double eta_h = stage.eta * p.h, kappa_h = stage.kappa * p.h, alpha = body.damping.alpha();
+  const State& state = *p.state;
+  Balance b;
+  b.pose = p.poses.stage;
+  if (p.use_past) {
+    b.past = {{4.0 / 3.0, &state.x}, {-1.0 / 3.0, &state.x_past}};
+    b.past_poses = {p.poses.now, p.poses.before};
+  } else {
+    b.past = {{1.0, &state.x}};
+    b.past_poses = {p.poses.now};
+  }
+  b.damping = body.damping.beta() / kappa_h;
+
+  // M (v+ - v_h) = theta h F and mass damping alpha M (v+ - v_frame), with v+ = (x+ - x_h) / (eta h) and
+  // v_frame the integrator's own difference of the flesh's place among its frames.
+  Points carried_past = Points::Zero(state.x.rows(), 3);
+  for (std::size_t k = 0; k < b.past.size(); ++k)
+    carried_past += b.past[k].share * carried(body, *b.past[k].x, *b.past_poses[k], *p.poses.stage);
+  const double of_velocity = 1.0 / (stage.theta * p.h);
+  b.inertia = (of_velocity + alpha) / eta_h;
+  b.target = *p.x_h + (of_velocity * *p.v_h + (alpha / kappa_h) * (carried_past - *p.x_h)) / b.inertia;
+  b.tie_target = tie_targets(body, *p.poses.stage);
+  b.load = weights(body, p.gravity, p.force);
+
+  const double elapsed = p.use_past ? p.h : eta_h;  // a start's stage lies at t + eta h
+  b.guess = state.x + elapsed * predicted_velocity(body, state, p.poses, elapsed);
+  place_bones(body, *p.poses.stage, b.guess);
+  fill_inactive_leaves(body, b.guess);
+  return b;
+}
+
+Balance rest_balance(const Body& body, const PoseProblem& problem, const Points& guess) {
+  Balance b;
+  b.pose = problem.pose;
+  b.tie_target = tie_targets(body, *problem.pose);
+  b.load = weights(body, problem.gravity, problem.force);
+  b.guess = guess;
+  place_bones(body, *problem.pose, b.guess);
+  fill_inactive_leaves(body, b.guess);
+  return b;
+}
+
+Points outer_forces(const Body& body, const Balance& b, const Points& x) {
+  const LeafMatrices& m = body.matrices;
+  Points forces = b.load + b.tie_target;
+  const bool moving = b.inertia > 0.0;
+  over_vertices(body, [&](int a) {
+    const auto i = static_cast<std::size_t>(a);
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (auto e = static_cast<std::size_t>(m.row_start[i]); e < static_cast<std::size_t>(m.row_start[i + 1]);
+         ++e) {
+      sum -= m.tie[e] * x.row(m.column[e]);
+      if (moving) sum += (b.inertia * m.mass[e]) * (b.target.row(m.column[e]) - x.row(m.column[e]));
+    }
+    forces.row(a) += sum;
+  });
+  return forces;
+}
+
+double force_scale(const Body& body, const Balance& b, const Points& x) {
+  double scale = b.load.norm() + (b.tie_target - apply_tie(body.matrices, x)).norm();
+  if (b.inertia > 0.0) scale += b.inertia * apply_mass(body.matrices, b.target - x).norm();
+  return scale;
+}
+
+CellSum::CellSum(const Body& body) {
+  std::vector<std::vector<int>> corners(static_cast<std::size_t>(body.mesh.num_vertices()));
+  for (int c = 0; c < static_cast<int>(body.mesh.cells.size()); ++c) {
+    for (int k = 0; k < 8; ++k)
+      corners[static_cast<std::size_t>(
+                  body.mesh.cells[static_cast<std::size_t>(c)][static_cast<std::size_t>(k)])]
+          .push_back(8 * c + k);
+  }
+  row_start_.push_back(0);
+  for (const auto& row : corners) {
+    corner_.insert(corner_.end(), row.begin(), row.end());
+    row_start_.push_back(static_cast<int>(corner_.size()));
+  }
+}
+
+Points CellSum::operator()(const std::vector<CellVector>& cells) const {
+  const auto n = static_cast<int>(row_start_.size()) - 1;
+  Points sums(n, 3);
+  tbb::parallel_for(tbb::blocked_range<int>(0, n, 256), [&](const tbb::blocked_range<int>& range) {
+    for (int a = range.begin(); a != range.end(); ++a) {
+      Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+      const auto i = static_cast<std::size_t>(a);
+      for (auto e = static_cast<std::size_t>(row_start_[i]); e < static_cast<std::size_t>(row_start_[i + 1]);
+           ++e)
+        sum += cells[static_cast<std::size_t>(corner_[e] / 8)].segment<3>(3 * (corner_[e] % 8)).transpose();
+      sums.row(a) = sum;
+    }
+  });
+  return sums;
+}
+
+std::string place_of(const Body& body, int cell) {
+  const int vertex = body.mesh.cells[static_cast<std::size_t>(cell)][0];
+  const int frame = dominant_frames(body.weights)[static_cast<std::size_t>(vertex)];
+  return fmt::format("leaf cell {} of '{}'", cell, body.tree.frames[static_cast<std::size_t>(frame)].name);
+}
+
+LeastStretch least_stretch(const Body& body, const Points& x) {
+  std::vector<double> least(body.mesh.cells.size(), std::numeric_limits<double>::infinity());
+  tbb::parallel_for(std::size_t{0}, least.size(), [&](std::size_t c) {
+    const CellGeometry geometry =
+        cell_geometry(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]), body.fill[c]);
+    const CellPoints points = cell_points(x, body.mesh.cells[c]);
+    for (std::size_t q = 0; q < 8; ++q) {
+      if (body.fill[c][q] < 0.5) continue;  // hardly any flesh
+      const Eigen::Matrix3d f = points * geometry.gradients[q];
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> squares;
+      squares.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
+      const double stretch = std::sqrt(std::max(0.0, squares.eigenvalues()[0]));
+      least[c] = std::min(least[c], f.determinant() > 0.0 ? stretch : -stretch);
+    }
+  });
+  const auto found = std::min_element(least.begin(), least.end());
+  return {*found, static_cast<int>(found - least.begin())};
+}
+
+void name_worst_cell(const Body& body, const Points& x, const Points& residual, SolveReport& report) {
+  double least = std::numeric_limits<double>::infinity(), largest = -1.0;
+  int most_inverted = -1, most_unbalanced = -1;
+  for (int c = 0; c < static_cast<int>(body.mesh.cells.size()); ++c) {
+    const lattice::HexVertices& cell = body.mesh.cells[static_cast<std::size_t>(c)];
+    const lattice::HexCorners rest = lattice::hex_corners(body.mesh.points, cell),
+                              posed = lattice::hex_corners(x, cell);
+    double unbalanced = 0.0;
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3d xi = gauss_point(k);
+      const double det = lattice::trilinear_jacobian(posed, xi).determinant() /
+                         lattice::trilinear_jacobian(rest, xi).determinant();
+      if (det < least) {
+        least = det;
+        most_inverted = c;
+      }
+      unbalanced += residual.row(cell[static_cast<std::size_t>(k)]).squaredNorm();
+    }
+    if (unbalanced > largest) {
+      largest = unbalanced;
+      most_unbalanced = c;
+    }
+  }
+  report.cell = least <= 0.0 ? most_inverted : most_unbalanced;
+  report.message += fmt::format("; worst is {} (smallest det F {:.3g})", place_of(body, report.cell), least);
+}
+
+}  // namespace sinew::fem

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <vector>
+
+#include "fem/models/cell_energy.h"
+#include "fem/models/model.h"
+
+/// The balance of forces that models which solve the flesh as one system bring about, in a stage or at rest:
+///   inertia M (target - x) + (ties) + load - f(x) = 0  at every unknown.
+namespace sinew::fem {
+
+/// Everything but the elastic force f; bones included in `guess` stay where they are.
+struct Balance {
+  double inertia = 0.0;             ///< mass matrix per squared step, with mass damping [1/s^2]; 0 at rest.
+  lattice::Points target;           ///< where inertia alone would take the flesh [m]; empty at rest.
+  lattice::Points tie_target;       ///< sum_b P_b (T_b X) [N]; the ties' force is that less P x.
+  lattice::Points load;             ///< gravity and loads [N].
+  double damping = 0.0;             ///< stiffness damping, beta / (kappa h) [-]; 0 at rest.
+  std::vector<PastPositions> past;  ///< what the strain's rate is measured against.
+  std::vector<const PosedFrames*> past_poses;  ///< of those positions.
+  const PosedFrames* pose = nullptr;           ///< at the solution.
+  lattice::Points guess;  ///< first guess of the solution, in the space of the unknowns [m].
+};
+
+/// Of a stage. The guess moves the flesh with its frames and lets it keep its velocity relative to them.
+Balance stage_balance(const Body& body, const StageProblem& problem);
+
+/// At rest; `guess` as it comes, with bone vertices put on the pose.
+Balance rest_balance(const Body& body, const PoseProblem& problem, const lattice::Points& guess);
+
+/// inertia M (target - x) + ties + load; num_vertices x 3 [N].
+lattice::Points outer_forces(const Body& body, const Balance& balance, const lattice::Points& x);
+
+/// Sum of the norms of the forces that outer_forces adds up: what residuals are compared with.
+double force_scale(const Body& body, const Balance& balance, const lattice::Points& x);
+
+/// x = sum_f s_f T_f^to (T_f^from)^-1 x: moved with the frames; inactive vertices and bones are not put
+/// right.
+lattice::Points carried(const Body& body, const lattice::Points& x, const PosedFrames& from,
+                        const PosedFrames& to);
+
+/// Sums of cell vectors at the leaf vertices, in the order of the cells.
+class CellSum {
+ public:
+  explicit CellSum(const Body& body);
+  lattice::Points operator()(const std::vector<CellVector>& cells) const;
+
+ private:
+  std::vector<int> row_start_, corner_;  ///< 8 * cell + corner.
+};
+
+/// "leaf cell 17 of 'upper'": the frame is the one that its first corner follows most.
+std::string place_of(const Body& body, int cell);
+
+/// Least principal stretch at the Gauss points of octants that are at least half flesh, negative where one is
+/// turned inside out, and its leaf cell.
+struct LeastStretch {
+  double stretch = 1.0;
+  int cell = -1;
+};
+LeastStretch least_stretch(const Body& body, const lattice::Points& x);
+
+/// "cell 17 round 'upper' (det F -0.31)": the most inverted cell where one is, else the cell with the largest
+/// residual. Sets report.cell and adds the place to report.message.
+void name_worst_cell(const Body& body, const lattice::Points& x, const lattice::Points& residual,
+                     SolveReport& report);
+
+}  // namespace sinew::fem

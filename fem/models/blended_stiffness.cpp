@@ -1,0 +1,13 @@
+#include "fem/models/blended_stiffness.h"
+
+#include "fem/models/rotated_model.h"
+
+namespace sinew::fem {
+
+std::unique_ptr<Model> make_blended_stiffness(const Body& body, const SolverOptions&) {
+  return make_rotated_model(
+      "blended-stiffness", body,
+      [&body](const lattice::Points&, const PosedFrames& pose) { return frame_rotations(body, pose); });
+}
+
+}  // namespace sinew::fem

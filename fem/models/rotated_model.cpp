@@ -1,0 +1,234 @@
+#include "fem/models/rotated_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "fem/models/balance.h"
+#include "fem/models/free_system.h"
+#include "fem/models/repeated_factor.h"
+
+namespace sinew::fem {
+namespace {
+
+using lattice::Points;
+using Rotations = std::vector<Eigen::Matrix3d>;
+
+class RotatedModel final : public Model {
+ public:
+  RotatedModel(std::string name, const Body& body, CellRotations rotations, const RotatedOptions& options)
+      : name_(std::move(name)),
+        body_(body),
+        rotations_(std::move(rotations)),
+        options_(options),
+        cells_(body),
+        free_(free_vertices(body)),
+        system_(body, free_),
+        cell_sum_(body),
+        matrices_(body.mesh.cells.size()),
+        forces_(body.mesh.cells.size()) {}
+
+  SolveReport prepare(double, Integrator) override { return {}; }
+
+  SolveReport solve_stage(const StageProblem& problem, Points& velocity) override {
+    const Balance balance = stage_balance(body_, problem);
+    Points x = balance.guess;
+    const Rotations rotations = rotations_(x, *balance.pose);
+    const Points residual = residual_of(balance, rotations, x);
+    SolveReport report = correct(balance, rotations, residual, options_.tolerance, x);
+    if (report.ok()) velocity = (x - *problem.x_h) / (stage_of(problem.integrator).eta * problem.h);
+    return report;
+  }
+
+  SolveReport equilibrate(const PoseProblem& problem, Points& x) override;
+
+  CellForces cell_forces(const Points& x, const PosedFrames& pose) override {
+    return cells_.forces(x, rotations_(x, pose));
+  }
+
+  SolverCounts counts() const override {
+    SolverCounts counts;
+    counts.regions = 1;
+    counts.functions = body_.mesh.num_functions();
+    counts.unknowns = {free_.num_unknowns()};
+    counts.factor_nonzeros = factor_.num_nonzeros();
+    return counts;
+  }
+
+ private:
+  Points residual_of(const Balance& balance, const Rotations& rotations, const Points& x);
+  SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
+                      double tolerance, Points& x);
+  bool refactor(const Balance& balance, const Rotations& rotations, SolveReport& report);
+  std::vector<Eigen::Matrix3d> turns_since_factor(const Rotations& rotations) const;
+  void precondition(const std::vector<Eigen::Matrix3d>& turns, const Points& residual, Points& result) const;
+
+  std::string name_;
+  const Body& body_;
+  CellRotations rotations_;
+  RotatedOptions options_;
+  RotatedStiffness cells_;
+  FreeVertices free_;
+  BlockSystem system_;
+  CellSum cell_sum_;
+  std::vector<CellStiffness> matrices_;
+  std::vector<CellVector> forces_;
+  double scale_ = 0.0;  ///< of the forces at the last residual.
+
+  RepeatedFactor factor_;
+  double factor_inertia_ = -1.0, factor_damping_ = -1.0;
+  Rotations factor_rotations_;
+};
+
+/// Forces left over at the unknowns.
+Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations, const Points& x) {
+  std::vector<Rotations> past;
+  if (balance.damping > 0.0) {
+    for (std::size_t k = 0; k < balance.past.size(); ++k)
+      past.push_back(rotations_(*balance.past[k].x, *balance.past_poses[k]));
+  }
+  tbb::parallel_for(std::size_t{0}, forces_.size(), [&](std::size_t c) {
+    const int cell = static_cast<int>(c);
+    CellVector u = (1.0 + balance.damping) * cells_.displacement(cell, rotations[c], x);
+    for (std::size_t k = 0; k < past.size(); ++k)
+      u -=
+          balance.damping * balance.past[k].share * cells_.displacement(cell, past[k][c], *balance.past[k].x);
+    forces_[c] = turned(rotations[c], cells_.stiffness(cell) * u);
+  });
+  const Points elastic = cell_sum_(forces_);
+  scale_ = force_scale(body_, balance, x) + elastic.norm();
+  return free_.gather(outer_forces(body_, balance, x) - elastic);
+}
+
+bool RotatedModel::refactor(const Balance& balance, const Rotations& rotations, SolveReport& report) {
+  const Factor::Report factor = factor_.factorise(system_.lower());
+  if (!factor.ok) {
+    report.status = SolveStatus::NotPositiveDefinite;
+    report.message = name_ + ": " + factor.message;
+    return false;
+  }
+  factor_inertia_ = balance.inertia;
+  factor_damping_ = balance.damping;
+  factor_rotations_ = rotations;
+  return true;
+}
+
+/// Mean rotation of the cells round every unknown since the factor was made.
+std::vector<Eigen::Matrix3d> RotatedModel::turns_since_factor(const Rotations& rotations) const {
+  std::vector<Eigen::Vector4d> sums(static_cast<std::size_t>(body_.mesh.num_vertices()),
+                                    Eigen::Vector4d::Zero());
+  for (std::size_t c = 0; c < rotations.size(); ++c) {
+    const Eigen::Quaterniond turn(rotations[c] * factor_rotations_[c].transpose());
+    for (int a : body_.mesh.cells[c]) {
+      Eigen::Vector4d& sum = sums[static_cast<std::size_t>(a)];
+      sum += sum.dot(turn.coeffs()) < 0.0 ? -turn.coeffs() : turn.coeffs();
+    }
+  }
+  std::vector<Eigen::Matrix3d> turns;
+  turns.reserve(free_.vertex.size());
+  for (int a : free_.vertex) {
+    const Eigen::Vector4d& sum = sums[static_cast<std::size_t>(a)];
+    const bool usable = sum.norm() > 0.1;
+    turns.push_back(usable ? Eigen::Quaterniond(sum.normalized()).toRotationMatrix()
+                           : Eigen::Matrix3d::Identity());
+  }
+  return turns;
+}
+
+void RotatedModel::precondition(const std::vector<Eigen::Matrix3d>& turns, const Points& residual,
+                                Points& result) const {
+  result.resize(residual.rows(), 3);
+  for (Eigen::Index i = 0; i < residual.rows(); ++i)
+    result.row(i) = residual.row(i) * turns[static_cast<std::size_t>(i)];
+  factor_.solve(Eigen::Map<Eigen::VectorXd>(result.data(), result.size()));
+  for (Eigen::Index i = 0; i < residual.rows(); ++i)
+    result.row(i) = (turns[static_cast<std::size_t>(i)] * result.row(i).transpose()).transpose();
+}
+
+/// Adds to x the solution of the system for `residual`.
+SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotations, const Points& residual,
+                                  double tolerance, Points& x) {
+  SolveReport report;
+  tbb::parallel_for(std::size_t{0}, matrices_.size(), [&](std::size_t c) {
+    matrices_[c] = (1.0 + balance.damping) * cells_.rotated(static_cast<int>(c), rotations[c]);
+  });
+  system_.assemble(balance.inertia, 1.0, matrices_);
+  const bool other = factor_inertia_ != balance.inertia || factor_damping_ != balance.damping;
+  if ((other || !factor_.ok()) && !refactor(balance, rotations, report)) return report;
+
+  Points r = residual, dx = Points::Zero(r.rows(), 3), z, direction, image;
+  std::vector<Eigen::Matrix3d> turns = turns_since_factor(rotations);
+  const double enough = tolerance * scale_;
+  double rz = 0.0;
+  bool fresh = false;
+  for (int since_factor = 0; r.norm() > enough; ++report.iterations, ++since_factor) {
+    if (since_factor == options_.stale_after) {
+      // With a factor of this very matrix a step or two remain; more means that rounding rules.
+      if (fresh) break;
+      if (!refactor(balance, rotations, report)) return report;
+      turns = turns_since_factor(rotations);
+      fresh = true;
+      since_factor = 0;
+    }
+    precondition(turns, r, z);
+    const double next = r.cwiseProduct(z).sum();
+    if (!std::isfinite(next)) {
+      report.status = SolveStatus::NoConvergence;
+      report.message = name_ + ": forces are not finite";
+      return report;
+    }
+    direction = since_factor == 0 ? z : Points(z + next / rz * direction);
+    rz = next;
+    system_.apply(direction, image);
+    const double length = rz / direction.cwiseProduct(image).sum();
+    dx += length * direction;
+    r -= length * image;
+  }
+  report.residual = r.norm() / std::max(scale_, std::numeric_limits<double>::min());
+  x += free_.spread(dx);
+  return report;
+}
+
+SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
+  const Balance balance = rest_balance(body_, problem, x);
+  Points solution = balance.guess;
+  SolveReport total;
+  Points residual;
+  const double extent = solution.rowwise().norm().maxCoeff();
+  for (; total.iterations < options_.max_rest_iterations; ++total.iterations) {
+    const Rotations rotations = rotations_(solution, *balance.pose);
+    residual = residual_of(balance, rotations, solution);
+    total.residual = residual.norm() / std::max(scale_, std::numeric_limits<double>::min());
+    if (!std::isfinite(total.residual)) break;
+    if (residual.norm() <= options_.rest_tolerance * scale_) {
+      x = solution;
+      return total;
+    }
+    const Points before = solution;
+    const SolveReport step = correct(balance, rotations, residual, 0.1 * options_.rest_tolerance, solution);
+    if (!step.ok()) return step;
+    if ((solution - before).cwiseAbs().maxCoeff() <= 1e-15 * extent) {
+      x = solution;
+      return total;
+    }
+  }
+  total.status = SolveStatus::NoConvergence;
+  total.message = fmt::format("{}: no balance of forces after {} iterations, residual {:.2g} of the forces",
+                              name_, total.iterations, total.residual);
+  name_worst_cell(body_, solution, free_.spread(residual), total);
+  return total;
+}
+
+}  // namespace
+
+std::unique_ptr<Model> make_rotated_model(std::string name, const Body& body, CellRotations rotations,
+                                          const RotatedOptions& options) {
+  return std::make_unique<RotatedModel>(std::move(name), body, std::move(rotations), options);
+}
+
+}  // namespace sinew::fem

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "fem/models/rotated_stiffness.h"
+
+namespace sinew::fem {
+
+/// How the one linear system of a stage is solved.
+struct RotatedOptions {
+  /// Residual of the conjugate gradients over the forces that balance [-]; in (0, 1). Of a stage.
+  double tolerance = 1e-6;
+  double rest_tolerance = 1e-10;  ///< the same at rest.
+  /// Iterations after which the preconditioner is factored anew; >= 1.
+  int stale_after = 15;
+  int max_rest_iterations = 500;  ///< of the rotations at rest; >= 1.
+};
+
+/// A model whose cells are linear in rotations of their own: one symmetric system per stage,
+///   [inertia M + P + (1 + damping) sum_e R_e K_e R_e^T] dx = residual,
+/// solved by conjugate gradients. The preconditioner is a Cholesky factor of an earlier stage's system,
+/// turned at every vertex by what the cells round it have turned since, so that it lasts while the flesh
+/// swings.
+std::unique_ptr<Model> make_rotated_model(std::string name, const Body& body, CellRotations rotations,
+                                          const RotatedOptions& options = {});
+
+}  // namespace sinew::fem
