@@ -135,16 +135,17 @@ int text_width(const std::string& text, int scale) {
   return draw_text(scratch, 0, 0, scale, text, {});
 }
 
-void draw_titles(Image& image, const Layout& layout, const std::string& caption) {
+void draw_titles(Image& image, const Layout& layout, const PreviewOptions& options) {
+  const std::string& caption = options.caption;
   const Pen ink{kInk, 1.0, 0.0}, pale{kInk, 0.6, 0.0};
   const int baseline = 4 * layout.scale;
-  const std::array<std::string, 2> titles = {"sinew", "plain skinning"};
+  const std::array<std::string, 2> titles = {options.upper, options.lower};
   for (int row = 0; row < 2; ++row)
     draw_text(image, 6 * layout.scale, layout.top(row) - layout.band + baseline, layout.scale,
               titles[static_cast<std::size_t>(row)], ink);
   const int caption_left = layout.width() - 6 * layout.scale - text_width(caption, layout.scale);
   const int title_end = 14 * layout.scale + text_width(titles[0], layout.scale);
-  const std::string legend = "redder: farther from plain skinning";
+  const std::string legend = "redder: farther from " + options.lower;
   if (caption_left < title_end) return;
   draw_text(image, caption_left, baseline, layout.scale, caption, pale);
   if (title_end + text_width(legend, layout.scale) + 14 * layout.scale < caption_left)
@@ -227,7 +228,7 @@ Image render_preview(const lattice::Triangles& triangles, const std::vector<Prev
       draw_labels(image, layout, row, column, frame);
     }
   }
-  draw_titles(image, layout, options.caption);
+  draw_titles(image, layout, options);
   return image;
 }
 

@@ -25,6 +25,8 @@ struct PreviewOptions {
   UpAxis up_axis = UpAxis::Y;
   /// Printed at the top right, for example the names of the character and the clip.
   std::string caption = {};
+  /// Printed above the two rows of pictures.
+  std::string upper = "sinew", lower = "plain skinning";
   /// Linear RGB of every vertex, num_vertices x 3; empty = flesh all over.
   lattice::Points colours = {};
 

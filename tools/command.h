@@ -16,6 +16,7 @@ struct CommandContext {
 // one line).
 void add_compare_command(CLI::App& app, CommandContext& context);
 void add_inspect_command(CLI::App& app, CommandContext& context);
+void add_ladder_command(CLI::App& app, CommandContext& context);
 void add_lattice_command(CLI::App& app, CommandContext& context);
 void add_simulate_command(CLI::App& app, CommandContext& context);
 

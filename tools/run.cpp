@@ -22,6 +22,7 @@ namespace {
 void add_commands(CLI::App& app, CommandContext& context) {
   add_compare_command(app, context);
   add_inspect_command(app, context);
+  add_ladder_command(app, context);
   add_lattice_command(app, context);
   add_simulate_command(app, context);
 }

@@ -1,3 +1,5 @@
+#include "tools/simulate_command.h"
+
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
@@ -35,8 +37,6 @@ constexpr const char* kPicture = "preview.png";
 /// Everything that a run may write into its folder.
 const std::vector<std::string> kOutputs{"skin.obj",    "skin.pc2",    "skin.json",
                                         "lattice.vtu", "report.json", kPicture};
-
-void talk(const std::string& line) { std::cerr << line << '\n'; }
 
 /// Which vertices are written, in which order and space.
 struct OutputLayout {
@@ -139,7 +139,7 @@ std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> posed_bones(
   throw NumericalError(fmt::format("{}: {}: {}", character.rig.file, where, report.message));
 }
 
-void say_what_runs(const Scene& scene, const Character& c, const FrameRange& frames) {
+void say_what_runs(const Scene& scene, const Character& c, const FrameRange& frames, const Talk& talk) {
   const skeleton::Clip& clip = c.the_clip();
   const lattice::ControlLattice& l = c.lattice.lattice;
   talk(fmt::format("{}: {:.3g} m tall, clip '{}' of {:.3g} s, frames {} to {} at {:g} fps", c.rig.file,
@@ -243,7 +243,9 @@ void write_picture(const Character& character, const std::vector<assets::Preview
   assets::write_preview(file, all_triangles(character.rig), frames, picture);
 }
 
-void simulate(const Scene& scene) {
+}  // namespace
+
+void simulate(const Scene& scene, const Talk& talk) {
   std::unique_ptr<tbb::global_control> threads;
   if (scene.threads > 0) {
     threads = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
@@ -255,7 +257,7 @@ void simulate(const Scene& scene) {
   const Character character = make_character(scene, talk);
   const FrameRange frames = frame_range(scene, character.the_clip());
   const OutputLayout layout = make_layout(scene, character);
-  say_what_runs(scene, character, frames);
+  say_what_runs(scene, character, frames, talk);
   stop_if_interrupted("before the simulation");
 
   RunReport report;
@@ -301,8 +303,6 @@ void simulate(const Scene& scene) {
   if (scene.preview == Switch::On) talk("look at " + scene.output + "/" + kPicture);
 }
 
-}  // namespace
-
 void add_simulate_command(CLI::App& app, CommandContext& context) {
   CLI::App* command =
       app.add_subcommand("simulate", "Turn a rigged, animated character into frames of moving flesh");
@@ -313,7 +313,7 @@ void add_simulate_command(CLI::App& app, CommandContext& context) {
     if (options->print_scene_only()) {
       std::cout << print_scene(scene);
     } else {
-      simulate(scene);
+      simulate(scene, [](const std::string& line) { std::cerr << line << '\n'; });
     }
     context.exit_code = 0;
   });
