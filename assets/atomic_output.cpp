@@ -14,12 +14,14 @@
 
 #include <fmt/format.h>
 
+#include "assets/detail/descriptor.h"
 #include "assets/error.h"
 
 namespace sinew::assets {
 namespace {
 
 namespace fs = std::filesystem;
+using detail::Descriptor;
 
 /// Ending of the name under which an earlier run waits to be removed, where a file system cannot swap names.
 constexpr const char* kAside = "-replaced";
@@ -27,22 +29,6 @@ constexpr const char* kAside = "-replaced";
 [[noreturn]] void fail(const std::string& shown, const std::string& what, int error) {
   throw IoError(shown + ": " + what + ": " + std::strerror(error));
 }
-
-/// An open file descriptor.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  int release() { return std::exchange(fd_, -1); }
-
- private:
-  int fd_;
-};
 
 /// Absolute, without a slash at its end; the name itself is not followed if it is a symbolic link to nowhere.
 fs::path absolute_target(const std::string& shown) {
@@ -108,6 +94,9 @@ void clear_partials(const fs::path& target, const std::string& shown) {
 Descriptor lock_parent(const fs::path& target, const std::string& shown) {
   const fs::path parent = target.parent_path();
   Descriptor fd(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  // Not made on the fly: a misspelt path would leave a trail of folders.
+  if (fd.get() < 0 && errno == ENOENT)
+    throw IoError(fmt::format("{}: folder '{}' does not exist; hint: make it first", shown, parent.string()));
   if (fd.get() < 0) fail(shown, "cannot open folder '" + parent.string() + "'", errno);
   if (::access(parent.c_str(), W_OK | X_OK) != 0)
     fail(shown, "cannot write in folder '" + parent.string() + "'", errno);

@@ -1,10 +1,12 @@
 #include "tools/run.h"
 
-#include <cerrno>
 #include <cstdio>
 #include <iostream>
 #include <string>
 #include <vector>
+
+#include <poll.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -82,12 +84,18 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   return fmt::format("{}; hint: see {}", error.what(), help);
 }
 
+/// True for a pipe that nobody reads any more. Asked of the pipe itself: the write that failed may be long
+/// ago.
+bool reader_has_gone() {
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  return poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0;
+}
+
 /// Writes out what stdout still buffers. A reader that went away (`sinew inspect FILE | head`) is no failure.
 void flush_stdout() {
-  errno = 0;
   std::cout.flush();
   const bool failed = std::fflush(stdout) != 0 || !std::cout || std::ferror(stdout) != 0;
-  if (failed && errno != EPIPE) {
+  if (failed && !reader_has_gone()) {
     throw assets::IoError("standard output: cannot be written; hint: is the disk full?");
   }
 }

@@ -10,26 +10,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "assets/detail/descriptor.h"
 #include "assets/detail/text.h"
 #include "assets/error.h"
 
 namespace sinew::assets::detail {
 
 namespace {
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 [[noreturn]] void fail(const std::string& file, const std::string& what) {
   throw IoError(printable(file) + ": " + what);

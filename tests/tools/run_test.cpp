@@ -3,7 +3,6 @@
 
 #include "tools/run.h"
 
-#include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -12,12 +11,12 @@
 #include <string>
 #include <system_error>
 
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
 
 #include "assets/error.h"
+#include "tests/tools/run_command.h"
 #include "tools/exit_code.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
@@ -27,23 +26,11 @@
 namespace sinew::tools {
 namespace {
 
-struct Outcome {
-  int exit_code = -1;
-  std::string text;  ///< what comes out of stdout.
-};
+using tests::Outcome;
 
 /// Runs `sinew` with arguments and redirections for the shell.
 Outcome run_sinew(const std::string& arguments) {
-  const std::string line = std::string("'") + SINEW_COMMAND + "' " + arguments;
-  FILE* pipe = popen(line.c_str(), "r");
-  Outcome outcome;
-  if (pipe == nullptr) return outcome;
-  std::array<char, 4096> buffer{};
-  while (const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe))
-    outcome.text.append(buffer.data(), n);
-  const int status = pclose(pipe);
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return outcome;
+  return tests::run_line(std::string("'") + SINEW_COMMAND + "' " + arguments);
 }
 
 template <class Error>
@@ -133,6 +120,20 @@ TEST(InterruptDeathTest, StopsAtOnceAtTheSecondSignal) {
               testing::KilledBySignal(SIGINT), "");
 }
 
+/// Sent to the process and not to a thread of it, as another program sends it; waits until it has been seen.
+void send_and_wait(int signal) {
+  kill(getpid(), signal);
+  for (int n = 0; n < 5000 && interrupt_signal() == 0; ++n) usleep(1000);
+}
+
+TEST(InterruptDeathTest, StopsAtOnceAtTheSecondSigterm) {
+  EXPECT_EXIT((install_interrupt_handlers(), send_and_wait(SIGTERM), kill(getpid(), SIGTERM), sleep(20),
+               poll_and_exit()),
+              testing::KilledBySignal(SIGTERM), "");
+  EXPECT_EXIT((install_interrupt_handlers(), send_and_wait(SIGTERM), poll_and_exit()),
+              testing::ExitedWithCode(143), "^stopped by SIGTERM after frame 3$");
+}
+
 TEST(Command, PrintsItsVersion) {
   const Outcome outcome = run_sinew("--version");
   EXPECT_EQ(outcome.exit_code, 0);
@@ -176,6 +177,19 @@ TEST(Command, EndsQuietlyWhenTheReaderGoesAway) {
   ASSERT_EQ(pipe(ends), 0);
   close(ends[0]);  // the reader has gone before anything is written
   const Outcome outcome = run_sinew("--help 2>&1 >&" + std::to_string(ends[1]));
+  close(ends[1]);
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.text, "");
+}
+
+// More than a pipe's buffer holds: the write that fails is not the last.
+TEST(Command, EndsQuietlyWhenTheReaderOfALongAnswerGoesAway) {
+  const std::string rig = SINEW_SOURCE_DIR "/assets/samples/hopper.glb";
+  const std::string line = std::string("inspect '") + rig + "' --json 2>&1 >&";
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  close(ends[0]);
+  const Outcome outcome = run_sinew(line + std::to_string(ends[1]));
   close(ends[1]);
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_EQ(outcome.text, "");

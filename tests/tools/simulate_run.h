@@ -1,13 +1,10 @@
 #pragma once
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
 
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
@@ -15,28 +12,15 @@
 
 #include "assets/obj.h"
 #include "assets/pc2.h"
+#include "tests/tools/run_command.h"
 
 /// `sinew simulate` run as a user runs it, and what holds for every run.
 namespace sinew::tests {
 
 namespace fs = std::filesystem;
 
-struct Outcome {
-  int exit_code = -1;
-  std::string text;  ///< stdout and stderr.
-};
-
-inline Outcome run(const std::string& line) {
-  FILE* pipe = popen((line + " 2>&1").c_str(), "r");
-  Outcome outcome;
-  if (pipe == nullptr) return outcome;
-  std::array<char, 4096> buffer{};
-  while (const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe))
-    outcome.text.append(buffer.data(), n);
-  const int status = pclose(pipe);
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return outcome;
-}
+/// With what it says on stderr.
+inline Outcome run(const std::string& line) { return run_line(line + " 2>&1"); }
 
 inline std::string quoted(const fs::path& path) {
   std::string text = "'";
