@@ -8,6 +8,7 @@
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
+#include "fem/blended_solver.h"
 #include "tools/character.h"
 
 namespace sinew {
