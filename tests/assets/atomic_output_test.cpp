@@ -138,9 +138,9 @@ TEST_F(AtomicOutput, AFileInThePlaceOfTheFolderIsAnIoError) {
 }
 
 TEST_F(AtomicOutput, AMissingParentIsFoundBeforeTheWorkStarts) {
-  EXPECT_THAT(
-      [&] { OutputDirectory(at("no/such/run"), Overwrite::Refuse, own_); },
-      ThrowsMessage<IoError>(AllOf(HasSubstr(at("no/such")), HasSubstr("does not exist; hint: make it first"))));
+  EXPECT_THAT([&] { OutputDirectory(at("no/such/run"), Overwrite::Refuse, own_); },
+              ThrowsMessage<IoError>(
+                  AllOf(HasSubstr(at("no/such")), HasSubstr("does not exist; hint: make it first"))));
   EXPECT_THAT(entries(), IsEmpty());
 }
 
