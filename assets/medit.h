@@ -1,25 +1,19 @@
 #pragma once
 
 #include <string>
-#include <utility>
-#include <vector>
 
-#include "lattice/control_lattice.h"
+#include "assets/volume_mesh.h"
 
 /// Medit's ASCII .mesh [Frey01]. (MFEM uses the same suffix for another format, which is refused by name.)
 namespace sinew::assets {
 
-struct MeditMesh {
-  lattice::CellComplex complex;
-  /// Edges with a number each; the writer numbers the bones from 1.
-  std::vector<std::pair<std::array<int, 2>, int>> edges;
-};
-
-/// The text of a .mesh file; 17 digits, so that every double keeps its bits.
-std::string format_medit(const MeditMesh& mesh);
+/// The text of a .mesh file; shortest decimals that keep every bit. Regions are the references of the cells,
+/// lines become edges, the annotation a comment behind the end.
+std::string format_medit(const VolumeMesh& mesh);
 
 /// Tetrahedra, Prisms and Hexahedra; other sections are skipped, Pyramids refused. `text` is the content,
-/// `file` its name for messages. Throws InputError with line and section.
-MeditMesh parse_medit(const std::string& file, const std::string& text);
+/// `file` its name for messages. Cells are numbered from 1 within their section. Throws InputError with line
+/// and section.
+VolumeMesh parse_medit(const std::string& file, const std::string& text);
 
 }  // namespace sinew::assets

@@ -7,24 +7,12 @@
 #include <fmt/format.h>
 
 #include "assets/detail/base64.h"
+#include "assets/detail/vtk_cells.h"
 
 namespace sinew::assets {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "arrays are written as they lie in memory");
-
-int vtk_type(lattice::CellType type) {
-  switch (type) {
-    case lattice::CellType::Tetrahedron:
-      return 10;
-    case lattice::CellType::Wedge:
-      return 13;
-    case lattice::CellType::Hexahedron:
-      return 12;
-  }
-  return 0;
-}
-constexpr std::uint8_t kPolyLine = 4;
 
 std::string escape(const std::string& text) {
   std::string out;
@@ -80,29 +68,11 @@ void append_arrays(std::string& out, const std::vector<VtuArray>& arrays, std::s
 }
 
 void append_cells(std::string& out, const VtuGrid& grid) {
-  std::vector<std::int64_t> connectivity, offsets;
-  std::vector<std::uint8_t> types;
-  for (const lattice::Cell& cell : grid.cells) {
-    connectivity.insert(connectivity.end(), cell.vertices.begin(),
-                        cell.vertices.begin() + num_corners(cell.type));
-    // VTK's wedge has its first triangle's normal pointing away from the second.
-    if (cell.type == lattice::CellType::Wedge) {
-      const std::size_t first = connectivity.size() - 6;
-      std::swap(connectivity[first + 1], connectivity[first + 2]);
-      std::swap(connectivity[first + 4], connectivity[first + 5]);
-    }
-    offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
-    types.push_back(static_cast<std::uint8_t>(vtk_type(cell.type)));
-  }
-  for (const std::vector<int>& line : grid.lines) {
-    connectivity.insert(connectivity.end(), line.begin(), line.end());
-    offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
-    types.push_back(kPolyLine);
-  }
+  const detail::VtkCells cells = detail::vtk_cells(grid);
   out += "<Cells>\n";
-  append_array(out, "connectivity", 1, connectivity);
-  append_array(out, "offsets", 1, offsets);
-  append_array(out, "types", 1, types);
+  append_array(out, "connectivity", 1, cells.connectivity);
+  append_array(out, "offsets", 1, cells.offsets);
+  append_array(out, "types", 1, std::vector<std::uint8_t>(cells.types.begin(), cells.types.end()));
   out += "</Cells>\n";
 }
 

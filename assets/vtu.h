@@ -5,9 +5,11 @@
 #include <variant>
 #include <vector>
 
+#include "assets/volume_mesh.h"
 #include "lattice/control_lattice.h"
 
-/// VTK's XML unstructured grids (.vtu, https://docs.vtk.org "VTKXMLFileFormats"), as ParaView opens them.
+/// VTK's unstructured grids, as ParaView opens them: XML (.vtu, https://docs.vtk.org "VTKXMLFileFormats") and
+/// legacy (.vtk, "VTKLegacyFileFormats").
 namespace sinew::assets {
 
 /// A named array on points, on cells or on the whole file, `components` values per tuple.
@@ -17,12 +19,14 @@ struct VtuArray {
   std::variant<std::vector<double>, std::vector<std::int64_t>, std::vector<std::uint8_t>> values;
 };
 
-/// What a .vtu file holds for us.
+/// What such a file holds for us.
 struct VtuGrid {
   lattice::Points points;
   std::vector<lattice::Cell> cells;
   /// Chains of points drawn as lines, after the cells; they have entries in `cell_arrays`, too.
   std::vector<std::vector<int>> lines;
+  /// What a reader found the cells as, counting from 0 and with those it skipped; empty when writing.
+  std::vector<std::int64_t> cell_numbers;
   std::vector<VtuArray> point_arrays;  ///< points.rows() tuples each.
   std::vector<VtuArray> cell_arrays;   ///< cells.size() + lines.size() tuples each.
   std::vector<VtuArray> file_arrays;   ///< any length.
@@ -32,10 +36,16 @@ struct VtuGrid {
 /// Throws std::invalid_argument where an array has the wrong length.
 std::string format_vtu(const VtuGrid& grid);
 
-/// Reads what format_vtu writes, and ASCII or uncompressed base64 files of other programs that hold
-/// tetrahedra, wedges and hexahedra; points, lines and faces among the cells are skipped, arrays of other
-/// types ignored. `text` is the content, `file` its name for messages. Throws InputError with the line and
-/// the array.
+/// Reads files of one piece that hold tetrahedra, wedges and hexahedra: ASCII, base64 or appended (raw or
+/// base64), either byte order, plain or compressed by zlib. Points and faces among the cells are skipped,
+/// arrays of other types than numbers ignored. `text` is the content, `file` its name for messages. Throws
+/// InputError with the line and the array, LimitError where the data unpack to more than a file may hold.
 VtuGrid parse_vtu(const std::string& file, const std::string& text);
+
+/// The text of a legacy file, version 3.0. ASCII has the shortest decimals that keep every bit.
+std::string format_vtk(const VtuGrid& grid, Encoding encoding);
+
+/// Reads legacy files (versions 1.0 to 5.1, ASCII or binary) as parse_vtu() does.
+VtuGrid parse_vtk(const std::string& file, const std::string& text);
 
 }  // namespace sinew::assets

@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <map>
-#include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
 
-#include "assets/detail/base64.h"
+#include "assets/detail/vtk_cells.h"
+#include "assets/detail/vtu_data.h"
 #include "assets/detail/xml_tags.h"
 #include "assets/error.h"
 #include "assets/vtu.h"
@@ -30,7 +28,7 @@ struct DataArray {
 class Reader {
  public:
   Reader(const std::string& file, const std::string& text)
-      : file_(file), tags_(detail::xml_tags(file, text)) {}
+      : file_(file), markup_(text), tags_(detail::xml_tags(file, markup_.text())) {}
 
   VtuGrid read() {
     read_head();
@@ -41,6 +39,7 @@ class Reader {
     for (DataArray& array : arrays_) {
       VtuArray out{array.name, array.components, std::move(array.values)};
       if (array.section == "PointData") grid.point_arrays.push_back(std::move(out));
+      if (array.section == "CellData") detail::add_cell_array(out, num_cells_, places_, grid);
       if (array.section == "FieldData") grid.file_arrays.push_back(std::move(out));
     }
     return grid;
@@ -61,12 +60,14 @@ class Reader {
   std::int64_t count(const XmlTag& tag, const char* attribute) const;
   std::vector<std::int64_t> integers(const DataArray& array) const;
   void read_points(VtuGrid& grid) const;
-  void read_cells(VtuGrid& grid) const;
+  void read_cells(VtuGrid& grid);
 
   const std::string& file_;
+  const detail::VtuMarkup markup_;  ///< the text that the tags point into.
   std::vector<XmlTag> tags_;
   std::vector<DataArray> arrays_;
-  std::size_t header_bytes_ = 4;
+  detail::VtuEncoding encoding_;
+  std::vector<std::int64_t> places_;  ///< in the file's cells, of our cells and lines.
   std::int64_t num_points_ = 0, num_cells_ = 0;
   int piece_line_ = 0;
 };
@@ -79,15 +80,17 @@ void Reader::read_head() {
   const std::string type = head->attribute("type");
   if (type != "UnstructuredGrid")
     fail(head->line, fmt::format("VTKFile: type, got '{}', expected 'UnstructuredGrid'", type));
-  if (!head->attribute("compressor").empty())
-    fail(head->line, "VTKFile: the data are compressed, expected plain data; hint: save without compression");
-  if (head->attribute("byte_order") == "BigEndian")
-    fail(head->line, "VTKFile: byte_order, got 'BigEndian', expected 'LittleEndian'");
-  if (head->attribute("header_type") == "UInt64") header_bytes_ = 8;
+  const std::string compressor = head->attribute("compressor");
+  if (!compressor.empty() && compressor != "vtkZLibDataCompressor")
+    fail(head->line, fmt::format("VTKFile: compressor, got '{}', expected 'vtkZLibDataCompressor' or none; "
+                                 "hint: save with ZLib or without compression",
+                                 compressor));
+  encoding_.zlib = !compressor.empty();
+  encoding_.swap_bytes = head->attribute("byte_order") == "BigEndian";
+  if (head->attribute("header_type") == "UInt64") encoding_.header_bytes = 8;
   int pieces = 0;
   for (const XmlTag& tag : tags_) {
-    if (tag.name == "AppendedData")
-      fail(tag.line, "AppendedData: expected arrays in line; hint: choose data mode ASCII or Binary");
+    if (tag.name == "AppendedData") encoding_.appended_is_raw = tag.attribute("encoding") == "raw";
     if (tag.name != "Piece") continue;
     if (++pieces > 1) fail(tag.line, "Piece: there are several, expected one; hint: merge the blocks");
     num_points_ = count(tag, "NumberOfPoints");
@@ -145,18 +148,19 @@ template <class Stored, class T>
 std::vector<T> Reader::decode_as(const XmlTag& tag, const std::string& label) const {
   const std::string format = tag.attribute("format");
   if (format == "ascii") return decode_ascii<T>(tag, label);
-  if (format != "binary")
-    fail(tag.line, fmt::format("{}: format, got '{}', expected 'ascii' or 'binary'", label, format));
-  const auto bytes = detail::decode_base64(tag.text);
-  if (!bytes) fail(tag.text_line, label + ": the data are not base64");
-  std::uint64_t announced = 0;
-  if (bytes->size() >= header_bytes_) std::memcpy(&announced, bytes->data(), header_bytes_);
-  if (bytes->size() < header_bytes_ || announced != bytes->size() - header_bytes_ ||
-      announced % sizeof(Stored) != 0)
-    fail(tag.text_line, fmt::format("{}: the data hold {} bytes, got a header of {}", label,
-                                    bytes->size() - std::min(bytes->size(), header_bytes_), announced));
-  std::vector<Stored> stored(announced / sizeof(Stored));
-  if (announced > 0) std::memcpy(stored.data(), bytes->data() + header_bytes_, announced);
+  const auto refuse = [&](const std::string& what) { fail(tag.text_line, label + ": " + what); };
+  std::vector<std::uint8_t> bytes;
+  if (format == "binary") {
+    bytes = detail::vtu_inline_data(encoding_, tag.text, refuse);
+  } else if (format == "appended") {
+    bytes = detail::vtu_appended_data(encoding_, markup_.appended(), tag.attribute("offset"), refuse);
+  } else {
+    fail(tag.line,
+         fmt::format("{}: format, got '{}', expected 'ascii', 'binary' or 'appended'", label, format));
+  }
+  if (bytes.size() % sizeof(Stored) != 0)
+    refuse(fmt::format("got {} bytes, expected a multiple of {}", bytes.size(), sizeof(Stored)));
+  const std::vector<Stored> stored = detail::numbers_from_bytes<Stored>(bytes, encoding_.swap_bytes);
   return std::vector<T>(stored.begin(), stored.end());
 }
 
@@ -180,11 +184,15 @@ DataArray Reader::decode(const XmlTag& tag, const std::string& section) const {
     array.values = decode_as<std::int32_t, std::int64_t>(tag, label);
   else if (type == "UInt32")
     array.values = decode_as<std::uint32_t, std::int64_t>(tag, label);
+  else if (type == "Int16")
+    array.values = decode_as<std::int16_t, std::int64_t>(tag, label);
+  else if (type == "UInt16")
+    array.values = decode_as<std::uint16_t, std::int64_t>(tag, label);
   else if (type == "UInt8")
     array.values = decode_as<std::uint8_t, std::uint8_t>(tag, label);
   else if (type == "Int8")
     array.values = decode_as<std::int8_t, std::int64_t>(tag, label);
-  return array;  // other types stay empty: strings and short integers of other programs
+  return array;  // other types stay empty: strings of other programs
 }
 
 const DataArray& Reader::find(const std::string& section, const std::string& name) const {
@@ -215,58 +223,16 @@ void Reader::read_points(VtuGrid& grid) const {
   grid.points = Eigen::Map<const lattice::Points>(values->data(), num_points_, 3);
 }
 
-void Reader::read_cells(VtuGrid& grid) const {
-  const std::vector<std::int64_t> connectivity = integers(find("Cells", "connectivity"));
-  const std::vector<std::int64_t> offsets = integers(find("Cells", "offsets"));
-  const std::vector<std::int64_t> types = integers(find("Cells", "types"));
+void Reader::read_cells(VtuGrid& grid) {
   const int line = find("Cells", "types").line;
-  if (static_cast<std::int64_t>(offsets.size()) != num_cells_ ||
-      static_cast<std::int64_t>(types.size()) != num_cells_)
-    fail(line, fmt::format("Cells: got {} offsets and {} types, expected {} of each", offsets.size(),
-                           types.size(), num_cells_));
-  std::int64_t begin = 0;
-  for (std::size_t c = 0; c < types.size(); ++c) {
-    const std::int64_t end = offsets[c];
-    if (end < begin || end > static_cast<std::int64_t>(connectivity.size()))
-      fail(line, fmt::format("cell {}: offset, got {}, expected {}..{}", c, end, begin, connectivity.size()));
-    lattice::Cell cell;
-    const std::int64_t type = types[c];
-    const bool is_lower =
-        type >= 1 && type <= 9 && type != 8;  // vertices, lines and faces; 8 (pixel) as well
-    if (type == 10)
-      cell.type = lattice::CellType::Tetrahedron;
-    else if (type == 12)
-      cell.type = lattice::CellType::Hexahedron;
-    else if (type == 13)
-      cell.type = lattice::CellType::Wedge;
-    else if (type == 14)
-      fail(line, fmt::format(
-                     "cell {}: is a pyramid, whose apex has four edges; hint: split it into tetrahedra", c));
-    else if (!is_lower && type != 8)
-      fail(line,
-           fmt::format(
-               "cell {}: VTK cell type, got {}, expected 10 (tetrahedron), 12 (hexahedron) or 13 (wedge)", c,
-               type));
-    for (std::int64_t i = begin; i < end; ++i)
-      if (connectivity[i] < 0 || connectivity[i] >= num_points_)
-        fail(line,
-             fmt::format("cell {}: point, got {}, expected 0..{}", c, connectivity[i], num_points_ - 1));
-    if (is_lower || type == 8) {
-      if (type == 3 || type == 4)
-        grid.lines.emplace_back(connectivity.begin() + begin, connectivity.begin() + end);
-    } else {
-      if (end - begin != num_corners(cell.type))
-        fail(line,
-             fmt::format("cell {}: got {} points, expected {}", c, end - begin, num_corners(cell.type)));
-      std::copy(connectivity.begin() + begin, connectivity.begin() + end, cell.vertices.begin());
-      if (cell.type == lattice::CellType::Wedge) {
-        std::swap(cell.vertices[1], cell.vertices[2]);
-        std::swap(cell.vertices[4], cell.vertices[5]);
-      }
-      grid.cells.push_back(cell);
-    }
-    begin = end;
-  }
+  const detail::VtkCells cells{integers(find("Cells", "connectivity")), integers(find("Cells", "offsets")),
+                               integers(find("Cells", "types"))};
+  if (static_cast<std::int64_t>(cells.offsets.size()) != num_cells_ ||
+      static_cast<std::int64_t>(cells.types.size()) != num_cells_)
+    fail(line, fmt::format("Cells: got {} offsets and {} types, expected {} of each", cells.offsets.size(),
+                           cells.types.size(), num_cells_));
+  places_ =
+      detail::read_vtk_cells(cells, num_points_, grid, [&](const std::string& what) { fail(line, what); });
 }
 
 }  // namespace

@@ -90,6 +90,12 @@ struct LatticeQuality {
   int components_without_bone = 0;
 };
 
+/// The name of a region of cells, where the user's file has one.
+struct RegionName {
+  int number = 0;  ///< as in ControlLattice::regions.
+  std::string name;
+};
+
 /// The whole product of the builder or of a reader.
 struct ControlLattice {
   CellComplex complex;
@@ -102,6 +108,9 @@ struct ControlLattice {
   std::vector<int> frame_of_joint;
   double edge_length = 0.0;  ///< target edge h [m].
   int retries = 0;           ///< how many attempts the gate refused.
+  /// Regions of the user's file (physical groups, references): the number of every cell's, or empty.
+  std::vector<int> regions;
+  std::vector<RegionName> region_names;  ///< of some of them.
 };
 
 /// Edges of a cell as pairs of corners; 6, 9 or 12 of them.

@@ -1,5 +1,7 @@
 #include "assets/detail/base64.h"
 
+#include <algorithm>
+
 namespace sinew::assets::detail {
 namespace {
 
@@ -27,12 +29,13 @@ std::string encode_base64(const std::vector<std::uint8_t>& bytes) {
   return out;
 }
 
-std::optional<std::vector<std::uint8_t>> decode_base64(std::string_view text) {
+std::optional<std::vector<std::uint8_t>> decode_base64(std::string_view text, std::size_t at_most) {
   std::vector<std::uint8_t> out;
-  out.reserve(text.size() / 4 * 3);
+  out.reserve(std::min(text.size() / 4 * 3, at_most) + 3);
   std::uint32_t group = 0;
   int digits = 0, padding = 0;
   for (const char c : text) {
+    if (digits == 0 && out.size() >= at_most) break;
     if (c == ' ' || c == '\n' || c == '\r' || c == '\t') continue;
     const int digit = c == '=' ? 0 : digit_of(c);
     if (digit < 0 || (padding > 0 && c != '=')) return std::nullopt;
@@ -46,6 +49,7 @@ std::optional<std::vector<std::uint8_t>> decode_base64(std::string_view text) {
     digits = padding = 0;
   }
   if (digits != 0) return std::nullopt;
+  out.resize(std::min(out.size(), at_most));
   return out;
 }
 

@@ -1,5 +1,7 @@
 #include "assets/detail/lattice_json.h"
 
+#include <algorithm>
+#include <array>
 #include <map>
 
 #include <nlohmann/json.hpp>
@@ -12,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Eigen::Vector3d;
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;  // 2: regions, coincident vertices
 
 Json to_json(const Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
@@ -93,9 +95,57 @@ lattice::LatticeBone bone_from_json(const Json& json, const JsonReader& reader) 
   return bone;
 }
 
+/// Two vertices of cells at bitwise the same place: copies of limbs.
+bool has_coincident_vertices(const lattice::CellComplex& complex) {
+  std::vector<std::array<double, 3>> places;
+  for (Eigen::Index v = 0; v < complex.points.rows(); ++v)
+    places.push_back({complex.points(v, 0), complex.points(v, 1), complex.points(v, 2)});
+  std::sort(places.begin(), places.end());
+  return std::adjacent_find(places.begin(), places.end()) != places.end();
+}
+
+/// [value, how often] pairs, as neighbours mostly are alike.
+Json run_lengths(const std::vector<int>& values) {
+  Json runs = Json::array();
+  for (std::size_t i = 0, j = 0; i < values.size(); i = j) {
+    for (j = i; j < values.size() && values[j] == values[i];) ++j;
+    runs.push_back(Json::array({values[i], j - i}));
+  }
+  return runs;
+}
+
+std::vector<int> from_run_lengths(const Json& runs, std::size_t expected, const JsonReader& reader) {
+  std::vector<int> values;
+  for (const Json& run : runs) {
+    if (!run.is_array() || run.size() != 2 || !run[0].is_number_integer() || !run[1].is_number_unsigned())
+      reader.fail("key 'regions': expected pairs of a number and a count");
+    const auto count = run[1].get<std::uint64_t>();
+    if (count > expected - values.size()) reader.fail("key 'regions': more entries than cells");
+    values.insert(values.end(), count, run[0].get<int>());
+  }
+  if (!values.empty() && values.size() != expected) reader.fail("key 'regions': fewer entries than cells");
+  return values;
+}
+
+void restore_order(const std::vector<int>& order, const JsonReader& reader,
+                   std::vector<lattice::Cell>& cells) {
+  if (order.empty()) return;
+  std::vector<lattice::Cell> restored;
+  std::vector<bool> taken(cells.size(), false);
+  for (int place : order) {
+    if (place < 0 || place >= static_cast<int>(cells.size()) || taken[static_cast<std::size_t>(place)])
+      reader.fail("key 'cell_order': expected every cell once");
+    taken[static_cast<std::size_t>(place)] = true;
+    restored.push_back(cells[static_cast<std::size_t>(place)]);
+  }
+  if (restored.size() != cells.size()) reader.fail("key 'cell_order': expected every cell once");
+  cells = std::move(restored);
+}
+
 }  // namespace
 
-std::string lattice_to_json(const lattice::ControlLattice& lattice, const lattice::JointTree& joints) {
+std::string lattice_to_json(const lattice::ControlLattice& lattice, const lattice::JointTree& joints,
+                            const std::vector<int>& cell_order) {
   Json json;
   json["version"] = kVersion;
   json["edge_length"] = lattice.edge_length;
@@ -115,11 +165,17 @@ std::string lattice_to_json(const lattice::ControlLattice& lattice, const lattic
     const int frame = lattice.frame_of_joint[j];
     json["frame_of_joint"].push_back({joints.names[j], frame < 0 ? "" : joints.names[frame]});
   }
+  json["coincident"] = has_coincident_vertices(lattice.complex);
+  json["regions"] = run_lengths(lattice.regions);
+  json["region_names"] = Json::array();
+  for (const lattice::RegionName& region : lattice.region_names)
+    json["region_names"].push_back(Json::array({region.number, region.name}));
+  if (!cell_order.empty()) json["cell_order"] = cell_order;
   return json.dump(1, ' ', false, Json::error_handler_t::replace);
 }
 
-void lattice_from_json(const std::string& where, const std::string& text, const lattice::JointTree& joints,
-                       lattice::ControlLattice& lattice) {
+lattice::Coincidence lattice_from_json(const std::string& where, const std::string& text,
+                                       const lattice::JointTree& joints, lattice::ControlLattice& lattice) {
   const JsonReader reader(where, joints);
   const Json json = Json::parse(text, nullptr, false);
   if (json.is_discarded()) reader.fail("is not JSON");
@@ -143,6 +199,15 @@ void lattice_from_json(const std::string& where, const std::string& text, const 
     lattice.frame_of_joint[reader.joint(pair[0].get<std::string>())] =
         frame.empty() ? -1 : reader.joint(frame);
   }
+  lattice.regions = from_run_lengths(reader.at(json, "regions"), lattice.complex.cells.size(), reader);
+  for (const Json& region : reader.at(json, "region_names")) {
+    if (!region.is_array() || region.size() != 2 || !region[0].is_number_integer() || !region[1].is_string())
+      reader.fail("key 'region_names': expected pairs of a number and a name");
+    lattice.region_names.push_back({region[0].get<int>(), region[1].get<std::string>()});
+  }
+  if (json.contains("cell_order"))
+    restore_order(reader.get<std::vector<int>>(json, "cell_order"), reader, lattice.complex.cells);
+  return reader.get<bool>(json, "coincident") ? lattice::Coincidence::Allowed : lattice::Coincidence::Refused;
 }
 
 }  // namespace sinew::assets::detail

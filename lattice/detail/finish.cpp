@@ -113,10 +113,11 @@ void place_chains(ControlLattice& lattice, const std::vector<std::vector<double>
   }
 }
 
-void hang_joints(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice) {
+void hang_joints(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice,
+                 FloatingParts floating) {
   lattice.soft_frames = skeleton.soft_frames;
   for (SoftFrame& frame : lattice.soft_frames) frame.position = input.unit_skin.to_rest(frame.position);
-  tie_floating_components(input, lattice);
+  if (floating == FloatingParts::Tie) tie_floating_components(input, lattice);
   std::vector<int> frames;
   for (const LatticeBone& bone : lattice.bones) frames.push_back(bone.frame);
   for (const SoftFrame& frame : lattice.soft_frames) frames.push_back(frame.frame);

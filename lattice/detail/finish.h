@@ -13,8 +13,12 @@ std::vector<LatticeBone> lattice_bones(const RigInput& input, const ReducedSkele
 /// s b with `parameters[b]` the s of each chain vertex of bone b.
 void place_chains(ControlLattice& lattice, const std::vector<std::vector<double>>& parameters);
 
+/// What becomes of components that no bone reaches.
+enum class FloatingParts { Tie, Leave };
+
 /// The rest of a lattice that has cells and bones: soft frames and changes of the skeleton, a soft frame for
-/// every component that no bone reaches, and the frame of every joint.
-void hang_joints(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice);
+/// every component that no bone reaches (unless told to leave them), and the frame of every joint.
+void hang_joints(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice,
+                 FloatingParts floating = FloatingParts::Tie);
 
 }  // namespace sinew::lattice::detail

@@ -25,40 +25,6 @@ constexpr double kInsideSlack = 1e-9;
 constexpr double kChainTolerance = 1e-12;
 constexpr int kVoxelsAcross = 32;  ///< for the skin's volume.
 
-/// Faces that one cell alone has, quadrilaterals split about their mean.
-std::vector<TriangleCorners> boundary_triangles(const CellComplex& complex) {
-  struct Face {
-    std::array<int, 4> key, vertices;
-  };
-  std::vector<Face> faces;
-  for (const Cell& cell : complex.cells)
-    for (const std::array<int, 4>& corners : cell_faces(cell.type)) {
-      Face face;
-      for (int k = 0; k < 4; ++k) face.vertices[k] = corners[k] < 0 ? -1 : cell.vertices[corners[k]];
-      face.key = face.vertices;
-      std::sort(face.key.begin(), face.key.end());
-      faces.push_back(face);
-    }
-  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.key < b.key; });
-  std::vector<TriangleCorners> triangles;
-  const auto point = [&](int v) -> Vector3d { return complex.points.row(v).transpose(); };
-  for (std::size_t i = 0; i < faces.size();) {
-    std::size_t j = i + 1;
-    while (j < faces.size() && faces[j].key == faces[i].key) ++j;
-    if (j == i + 1) {
-      const std::array<int, 4>& v = faces[i].vertices;
-      if (v[3] < 0) {
-        triangles.push_back({point(v[0]), point(v[1]), point(v[2])});
-      } else {
-        const Vector3d centre = 0.25 * (point(v[0]) + point(v[1]) + point(v[2]) + point(v[3]));
-        for (int k = 0; k < 4; ++k) triangles.push_back({point(v[k]), point(v[(k + 1) % 4]), centre});
-      }
-    }
-    i = j;
-  }
-  return triangles;
-}
-
 /// Triangles that cross a boundary face of the lattice, though all their vertices are inside.
 std::vector<int> find_triangles_outside(const CellComplex& complex, const Surface& skin,
                                         const std::vector<bool>& vertex_outside, double size) {
@@ -136,6 +102,39 @@ void measure_cells(const CellComplex& complex, Inspection& out) {
 }
 
 }  // namespace
+
+std::vector<TriangleCorners> boundary_triangles(const CellComplex& complex) {
+  struct Face {
+    std::array<int, 4> key, vertices;
+  };
+  std::vector<Face> faces;
+  for (const Cell& cell : complex.cells)
+    for (const std::array<int, 4>& corners : cell_faces(cell.type)) {
+      Face face;
+      for (int k = 0; k < 4; ++k) face.vertices[k] = corners[k] < 0 ? -1 : cell.vertices[corners[k]];
+      face.key = face.vertices;
+      std::sort(face.key.begin(), face.key.end());
+      faces.push_back(face);
+    }
+  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.key < b.key; });
+  std::vector<TriangleCorners> triangles;
+  const auto point = [&](int v) -> Vector3d { return complex.points.row(v).transpose(); };
+  for (std::size_t i = 0; i < faces.size();) {
+    std::size_t j = i + 1;
+    while (j < faces.size() && faces[j].key == faces[i].key) ++j;
+    if (j == i + 1) {
+      const std::array<int, 4>& v = faces[i].vertices;
+      if (v[3] < 0) {
+        triangles.push_back({point(v[0]), point(v[1]), point(v[2])});
+      } else {
+        const Vector3d centre = 0.25 * (point(v[0]) + point(v[1]) + point(v[2]) + point(v[3]));
+        for (int k = 0; k < 4; ++k) triangles.push_back({point(v[k]), point(v[(k + 1) % 4]), centre});
+      }
+    }
+    i = j;
+  }
+  return triangles;
+}
 
 std::vector<std::vector<int>> components(const CellComplex& complex) {
   std::vector<int> parent(complex.points.rows());

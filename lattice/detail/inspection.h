@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "lattice/build.h"
+#include "lattice/detail/triangle_grid.h"
 #include "lattice/detail/unit_skin.h"
 
 namespace sinew::lattice::detail {
@@ -28,6 +29,9 @@ std::vector<GateFailure> judge(const Inspection& inspection, const BuildOptions&
 
 /// Components that hold no vertex of a hard bone and no point of a soft bone or frame.
 std::vector<std::vector<int>> floating_components(const ControlLattice& lattice);
+
+/// The triangles of faces that one cell alone has, quadrilaterals split about their mean.
+std::vector<TriangleCorners> boundary_triangles(const CellComplex& complex);
 
 /// Connected components of cells (joined by a shared vertex), each in ascending order of cells.
 std::vector<std::vector<int>> components(const CellComplex& complex);
