@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
 #include <png.h>
 
@@ -136,12 +137,36 @@ int draw_text(Image& image, int left, int top, int scale, const std::string& tex
   return x - left;
 }
 
-void write_png(const std::string& file, const Image& image) {
+namespace {
+
+png_image png_head(const Image& image) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   png.width = static_cast<png_uint_32>(image.width);
   png.height = static_cast<png_uint_32>(image.height);
   png.format = PNG_FORMAT_RGB;
+  return png;
+}
+
+}  // namespace
+
+std::string png_bytes(const Image& image) {
+  png_image png = png_head(image);
+  png_alloc_size_t size = 0;
+  std::string bytes;
+  // The first call tells the size, the second writes.
+  for (int pass = 0; pass < 2; ++pass) {
+    bytes.resize(size);
+    if (png_image_write_to_memory(&png, pass == 0 ? nullptr : bytes.data(), &size, 0, image.rgb.data(), 0,
+                                  nullptr) == 0)
+      throw std::runtime_error(std::string("PNG: ") + png.message);
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+void write_png(const std::string& file, const Image& image) {
+  png_image png = png_head(image);
   if (png_image_write_to_file(&png, file.c_str(), 0, image.rgb.data(), 0, nullptr) == 0)
     throw IoError(file + ": cannot be written: " + png.message);
 }

@@ -40,6 +40,9 @@ void draw_line(Image& image, const Window& window, const Eigen::Vector2d& a, con
 /// : - _ + = / ( ) % '; anything else leaves a gap. Returns the width drawn [pixels].
 int draw_text(Image& image, int left, int top, int scale, const std::string& text, const Pen& pen);
 
+/// The content of a PNG file.
+std::string png_bytes(const Image& image);
+
 /// Writes a PNG file. Throws IoError naming the file.
 void write_png(const std::string& file, const Image& image);
 

@@ -315,16 +315,22 @@ VolumeMesh read_volume_mesh(const std::string& file) {
 }
 
 ControlLattice read_lattice(const std::string& file, const LatticeInput& input,
-                            const lattice::RecoverOptions& options) {
+                            const ReadLatticeOptions& options) {
   VolumeMesh mesh = read_volume_mesh(file);
+  if (mesh.annotation.empty()) {
+    for (Eigen::Index v = 0; v < mesh.complex.points.rows(); ++v)
+      mesh.complex.points.row(v) =
+          (options.rig_from_file * mesh.complex.points.row(v).transpose().eval()).transpose();
+    lattice::orient_cells(mesh.complex);  // the map may be a mirror
+  }
   try {
     if (mesh.annotation.empty()) {
       refuse_faults(file, mesh, lattice::Coincidence::Refused);
       // Before the bones, as a lattice in other units has neither where they should be; and after them, as
       // snapping moves vertices.
       refuse_skin_outside(mesh.complex, input);
-      ControlLattice lattice =
-          lattice::recover_bones(mesh.complex, input.skin.surface, input.joints, options, mesh.numbering);
+      ControlLattice lattice = lattice::recover_bones(mesh.complex, input.skin.surface, input.joints,
+                                                      options.bones, mesh.numbering);
       refuse_skin_outside(lattice.complex, input);
       lattice.regions = std::move(mesh.regions);
       lattice.region_names = std::move(mesh.region_names);

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "assets/atomic_output.h"
 #include "assets/lattice_input.h"
 #include "assets/volume_mesh.h"
@@ -49,7 +51,8 @@ LatticeFields skin_fields(const lattice::ControlLattice& lattice, const lattice:
 /// VTK files have the cell arrays dihedral [degrees], scaled_jacobian [-], volume [m^3], frame (a joint
 /// index: the frame of the bone or soft frame nearest to the cell's mean), region (the user's regions; frame
 /// where there are none) and bone (of the lines, an index; -1 for cells), the point array bone (-1 off the
-/// bones), `fields`, and the file array sinew_lattice (text). On lines real arrays are NaN.
+/// bones), `fields`, and the file array sinew_lattice (text). On lines real arrays are NaN (-1 in .vtk as
+/// text).
 std::string format_lattice(LatticeFormat format, const lattice::ControlLattice& lattice,
                            const lattice::JointTree& joints, const LatticeFields& fields = {},
                            std::string* second = nullptr);
@@ -68,12 +71,19 @@ std::vector<std::string> lattice_file_names(const std::string& file);
 /// IoError.
 VolumeMesh read_volume_mesh(const std::string& file);
 
+struct ReadLatticeOptions {
+  /// How bones are found in files of other programs.
+  lattice::RecoverOptions bones;
+  /// From the coordinates of such a file to the rig's space: metres, Y up. Sinew's own are there already.
+  Eigen::Affine3d rig_from_file = Eigen::Affine3d::Identity();
+};
+
 /// Reads a lattice for `input`. A file of write_lattice comes back bit for bit, its joints found by name. In
 /// files of other programs the bones are found in the edges (lattice/recover_bones.h). Whatever the file,
 /// cells (lattice/check_cells.h), bones, parts and the skin are checked, and the quality is measured anew.
 /// Throws ConfigError for an unknown extension, InputError with one line about the first thing wrong,
 /// IoError.
 lattice::ControlLattice read_lattice(const std::string& file, const LatticeInput& input,
-                                     const lattice::RecoverOptions& options = {});
+                                     const ReadLatticeOptions& options = {});
 
 }  // namespace sinew::assets

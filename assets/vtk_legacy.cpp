@@ -272,6 +272,8 @@ void append_number(std::string& out, T value, Encoding encoding) {
   if (encoding == Encoding::Ascii) {
     if constexpr (sizeof(T) == 1)
       out += fmt::format("{} ", static_cast<int>(value));
+    else if constexpr (std::is_same_v<T, double>)
+      out += std::isnan(value) ? std::string("-1 ") : fmt::format("{} ", value);  // VTK cannot read "nan"
     else
       out += fmt::format("{} ", value);
     return;

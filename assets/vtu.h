@@ -42,7 +42,8 @@ std::string format_vtu(const VtuGrid& grid);
 /// InputError with the line and the array, LimitError where the data unpack to more than a file may hold.
 VtuGrid parse_vtu(const std::string& file, const std::string& text);
 
-/// The text of a legacy file, version 3.0. ASCII has the shortest decimals that keep every bit.
+/// The text of a legacy file, version 3.0. ASCII has the shortest decimals that keep every bit, and -1 for
+/// NaN, which VTK cannot read there.
 std::string format_vtk(const VtuGrid& grid, Encoding encoding);
 
 /// Reads legacy files (versions 1.0 to 5.1, ASCII or binary) as parse_vtu() does.

@@ -216,8 +216,7 @@ std::string skin_outside(const CellComplex& complex, const Surface& skin) {
   }
   return fmt::format(
       "{} of {} skin vertices lie outside the lattice, the farthest, {}, by {:.3g} m: {}; hint: make the "
-      "lattice "
-      "larger, or check its units (metres, Y up, as sinew simulate --output-space si writes them)",
+      "lattice larger, or mind its units: metres and Y up, or the rig's with --lattice-space file",
       outside.size(), skin.points.rows(), which, farthest, number_list(outside));
 }
 

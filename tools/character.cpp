@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "assets/error.h"
+#include "assets/lattice_cache.h"
 #include "assets/lattice_files.h"
 #include "fem/default_material.h"
 #include "tools/failure.h"
@@ -148,9 +149,19 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
     const Phase phase(c.times, "lattice");
     const lattice::BuildOptions options = build_options(scene, c.input.joints.names);
     if (scene.lattice.empty()) {
-      c.lattice = lattice::build(c.input.skin.surface, c.input.joints, options);
+      const std::string folder =
+          scene.no_cache || scene.output.empty() ? "" : assets::cache_folder(scene.output);
+      assets::CachedBuild built =
+          assets::build_lattice(folder, c.input.skin.surface, c.input.joints, options);
+      if (built.use == assets::CacheUse::Hit) talk("lattice: nothing changed, taken from " + folder);
+      if (built.use == assets::CacheUse::Built) c.new_lattice_key = built.key;
+      c.lattice = std::move(built.result);
     } else {
-      c.lattice.lattice = assets::read_lattice(scene.lattice, c.input);
+      assets::ReadLatticeOptions read;
+      read.bones.snap_tolerance = scene.snap_tolerance;
+      read.bones.soft_bones = scene.soft_bones;
+      if (scene.lattice_space == OutputSpace::File) read.rig_from_file = c.rig.rig_from_file;
+      c.lattice.lattice = assets::read_lattice(scene.lattice, c.input, read);
       c.lattice.failures = lattice::check_gate(c.lattice.lattice, c.input.skin.surface, options);
     }
   }

@@ -22,6 +22,7 @@ struct Character {
   int clip = -1;                     ///< index into rig.clips.
   assets::LatticeInput input;        ///< welded skin and joints.
   lattice::BuildResult lattice;      ///< built, or read from the scene's lattice file.
+  std::string new_lattice_key;       ///< where it was built: its name in the cache, to be kept there.
   fem::BodyOptions body_options;     ///< materials and damping in force.
   std::vector<fem::HeldPlane> held;  ///< of a plain scene.
   std::vector<int> bare_frames;      ///< of a plain scene that nothing holds.

@@ -11,8 +11,10 @@
 #include <nlohmann/json.hpp>
 
 #include "assets/error.h"
+#include "assets/lattice_cache.h"
 #include "assets/lattice_files.h"
 #include "assets/lattice_input.h"
+#include "assets/lattice_picture.h"
 #include "assets/rig.h"
 #include "tools/command.h"
 #include "tools/failure.h"
@@ -28,6 +30,8 @@ constexpr double kMinHeight = 1e-3, kMaxHeight = 1e4;  ///< [m], as the scene's.
 
 Json to_json(const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
+std::string picture_name(const LatticeRequest& request) { return request.output + ".png"; }
+
 void check_request(const LatticeRequest& request) {
   if (request.cells < kMinCells)
     throw assets::ConfigError(
@@ -42,10 +46,17 @@ void check_request(const LatticeRequest& request) {
   if (request.height && !(*request.height >= kMinHeight && *request.height <= kMaxHeight))
     throw assets::ConfigError(
         fmt::format("--height: got {}, expected {} ... {} [m]", *request.height, kMinHeight, kMaxHeight));
-  assets::lattice_format(request.output);
-  std::error_code ignored;
-  if (!request.overwrite && std::filesystem::exists(std::filesystem::symlink_status(request.output, ignored)))
-    throw assets::BusyError(request.output + ": is there already; hint: give --overwrite or another name");
+  if (!(request.snap_tolerance > 0.0 && request.snap_tolerance <= 0.1))
+    throw assets::ConfigError(
+        fmt::format("--snap-tolerance: got {}, expected 0 < tolerance <= 0.1", request.snap_tolerance));
+  assets::lattice_format(request.output, request.format);
+  std::vector<std::string> files = assets::lattice_file_names(request.output);
+  if (!request.no_picture) files.push_back(picture_name(request));
+  for (const std::string& file : files) {
+    std::error_code ignored;
+    if (!request.overwrite && std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
+      throw assets::BusyError(file + ": is there already; hint: give --overwrite or another name");
+  }
 }
 
 /// One line for the failures of the gate, the worst first.
@@ -128,6 +139,65 @@ std::string lattice_report(const lattice::ControlLattice& lattice, const lattice
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+namespace {
+
+/// The user's lattice, or one that is built or found in the cache.
+assets::CachedBuild make_lattice(const LatticeRequest& request, const assets::Rig& rig,
+                                 const assets::LatticeInput& input) {
+  lattice::BuildOptions options;
+  options.cells = request.cells;
+  assets::CachedBuild built;
+  if (!request.lattice.empty()) {
+    assets::ReadLatticeOptions read;
+    read.bones.snap_tolerance = request.snap_tolerance;
+    read.bones.soft_bones = request.soft_bones;
+    if (request.lattice_in_file_space) read.rig_from_file = rig.rig_from_file;
+    built.result.lattice = assets::read_lattice(request.lattice, input, read);
+    for (const lattice::GateFailure& failure :
+         lattice::check_gate(built.result.lattice, input.skin.surface, options))
+      fmt::print(stderr, "warning: {}: {}\n", request.lattice, failure.what);
+    return built;
+  }
+  try {
+    const std::string folder = request.no_cache ? "" : assets::cache_folder(request.output);
+    built = assets::build_lattice(folder, input.skin.surface, input.joints, options);
+    if (built.use == assets::CacheUse::Hit)
+      fmt::print(stderr, "lattice: nothing changed, taken from {}\n", single_line(folder));
+  } catch (const std::invalid_argument& error) {
+    throw assets::InputError(request.rig, error.what());
+  }
+  if (!built.result.failures.empty()) throw NumericalError(gate_message(request.rig, built.result));
+  return built;
+}
+
+/// The picture first: the lattice under its name means that all is done.
+void write_outputs(const LatticeRequest& request, const lattice::ControlLattice& lattice,
+                   const assets::LatticeInput& input) {
+  const assets::Overwrite overwrite =
+      request.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse;
+  const bool has_fields = std::filesystem::path(request.output).extension().string().starts_with(".vt");
+  const assets::LatticeFields fields =
+      has_fields ? assets::skin_fields(lattice, input.skin.surface) : assets::LatticeFields{};
+  if (!request.no_picture) {
+    assets::LatticePictureOptions picture;
+    picture.caption =
+        fmt::format("{}: lattice of {} cells", std::filesystem::path(request.rig).stem().string(),
+                    lattice.complex.cells.size());
+    assets::write_file(picture_name(request),
+                       assets::png_bytes(assets::render_lattice(lattice, input.skin.surface, picture)),
+                       overwrite);
+  }
+  try {
+    assets::write_lattice(request.output, lattice, input.joints, overwrite, fields, request.format);
+  } catch (...) {
+    std::error_code ignored;
+    if (!request.no_picture) std::filesystem::remove(picture_name(request), ignored);
+    throw;
+  }
+}
+
+}  // namespace
+
 void run_lattice(const LatticeRequest& request) {
   check_request(request);
   const auto start = std::chrono::steady_clock::now();
@@ -136,37 +206,55 @@ void run_lattice(const LatticeRequest& request) {
   const assets::Rig rig = assets::load_rig(request.rig, load);
   const assets::LatticeInput input = assets::lattice_input(rig);
   stop_if_interrupted("before building the lattice");
-  lattice::BuildOptions options;
-  options.cells = request.cells;
-  lattice::BuildResult result;
-  try {
-    result = lattice::build(input.skin.surface, input.joints, options);
-  } catch (const std::invalid_argument& error) {
-    throw assets::InputError(request.rig, error.what());
-  }
+  const assets::CachedBuild built = make_lattice(request, rig, input);
+  const lattice::ControlLattice& lattice = built.result.lattice;
   stop_if_interrupted("before writing the lattice");
-  if (!result.failures.empty()) throw NumericalError(gate_message(request.rig, result));
-  assets::write_lattice(request.output, result.lattice, input.joints,
-                        request.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse);
-  if (request.json) std::cout << lattice_report(result.lattice, input.joints);
+  write_outputs(request, lattice, input);
+  if (built.use == assets::CacheUse::Built)
+    assets::keep_lattice(assets::cache_folder(request.output), built.key, built.result, input.joints);
+  if (request.json) std::cout << lattice_report(lattice, input.joints);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  print_summary(request, result.lattice, elapsed.count());
+  print_summary(request, lattice, elapsed.count());
 }
 
 void add_lattice_command(CLI::App& app, CommandContext&) {
   auto request = std::make_shared<LatticeRequest>();
+  auto space = std::make_shared<std::string>("si");
   CLI::App* command =
       app.add_subcommand("lattice", "Build the control lattice of a rig and write it to a file.");
   command->add_option("RIG", request->rig, "the character: glTF, FBX, Collada, ...")->required();
-  command->add_option("-o,--output", request->output, "file to write: .vtu (ParaView) or .mesh (Medit)")
+  command
+      ->add_option("-o,--output", request->output,
+                   "file to write: .vtu or .vtk (ParaView), .msh (Gmsh), .mesh (Medit), .node with .ele "
+                   "(TetGen), .veg "
+                   "(Vega)")
       ->required();
+  command->add_option(
+      "--format", request->format,
+      "vtk, vtk-binary, msh41, msh41-binary, msh22 or msh22-binary, where the extension leaves a "
+      "choice");
   command->add_option("--cells", request->cells, "wanted number of cells, 20 ... 1000000")
       ->capture_default_str();
   command->add_option("--height", request->height,
                       "height of the character [m]; guessed where it is not given");
+  command->add_option("--lattice", request->lattice,
+                      "check and write this lattice of yours instead of building one");
+  command->add_option("--lattice-space", *space, "its units and axes: si (metres, Y up) or file (the rig's)")
+      ->check(CLI::IsMember({"si", "file"}))
+      ->capture_default_str();
+  command
+      ->add_option("--snap-tolerance", request->snap_tolerance,
+                   "how far it may miss its bones, as a share of the character's size; 0 < tolerance <= 0.1")
+      ->capture_default_str();
+  command->add_flag("--soft-bones", request->soft_bones, "hold bones that are no edges of it by penalty");
+  command->add_flag("--no-picture", request->no_picture, "write no picture beside the file");
+  command->add_flag("--no-cache", request->no_cache, "build anew, and keep nothing for the next time");
   command->add_flag("--overwrite", request->overwrite, "replace the file if it is there");
   command->add_flag("--json", request->json, "print the lattice as JSON on stdout");
-  command->callback([request] { run_lattice(*request); });
+  command->callback([request, space] {
+    request->lattice_in_file_space = *space == "file";
+    run_lattice(*request);
+  });
 }
 
 }  // namespace sinew::tools

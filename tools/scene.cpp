@@ -44,9 +44,10 @@ std::string print_material(const BoneMaterial& material) {
 
 /// Keys that say something about a rig; a plain scene has none of them.
 bool is_of_characters(std::string_view key) {
-  constexpr std::string_view kKeys[] = {"rig",       "clip",          "lattice",       "cells",
-                                        "cell_size", "bones_include", "bones_exclude", "tip_bones",
-                                        "symmetry",  "height",        "output_space",  "output_mesh"};
+  constexpr std::string_view kKeys[] = {
+      "rig",      "clip",   "lattice",      "lattice_space", "snap_tolerance", "soft_bones",
+      "no_cache", "cells",  "cell_size",    "bones_include", "bones_exclude",  "tip_bones",
+      "symmetry", "height", "output_space", "output_mesh"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 

@@ -68,6 +68,15 @@ struct Scene {
   std::string clip;
   /// Lattice file; empty: a lattice is built.
   std::string lattice;
+  /// Units and axes of a lattice file of another program: metres with Y up, or the rig file's.
+  OutputSpace lattice_space = OutputSpace::Si;
+  /// How far a vertex of such a file may lie from the bone it stands for [-]; share of the longest side of
+  /// the skin's box; 1e-12 ... 0.1.
+  double snap_tolerance = 1e-4;
+  /// Bones that are no edges of such a file are held by penalty instead of being refused.
+  bool soft_bones = false;
+  /// Neither take a built lattice from `.sinew-cache` beside the output nor keep one there.
+  bool no_cache = false;
   /// Wanted number of lattice cells [-]; 20 ... 1e6.
   int cells = 1000;
   /// Wanted edge of the lattice's cells [m]; 1e-4 ... 1e3. Set: `cells` is not used.

@@ -13,12 +13,14 @@
 
 #include "assets/atomic_output.h"
 #include "assets/error.h"
+#include "assets/lattice_cache.h"
 #include "assets/lattice_files.h"
 #include "assets/obj.h"
 #include "assets/output_mesh.h"
 #include "assets/pc2.h"
 #include "assets/preview.h"
 #include "assets/sidecar.h"
+#include "tools/body_fields.h"
 #include "tools/character.h"
 #include "tools/command.h"
 #include "tools/failure.h"
@@ -188,7 +190,7 @@ void write_companions(const Scene& scene, const Character& character, const Outp
   sidecar.settings_json = nlohmann::json{{"scene_toml", report.settings}}.dump();
   out.write("skin.json", assets::sidecar_json(sidecar));
   out.write("lattice.vtu", assets::format_lattice(assets::LatticeFormat::Vtu, character.lattice.lattice,
-                                                  character.input.joints));
+                                                  character.input.joints, body_fields(body)));
   out.write("report.json", report_json(report, character, body));
 }
 
@@ -291,6 +293,9 @@ void simulate(const Scene& scene, const Talk& talk) {
   write_companions(scene, character, layout, report, body, frames, out);
   stop_if_interrupted("before the results were in place");
   out.commit();
+  if (!character.new_lattice_key.empty())
+    assets::keep_lattice(assets::cache_folder(scene.output), character.new_lattice_key, character.lattice,
+                         character.input.joints);
 
   if (scene.json) std::cout << report_json(report, character, body);
   double total = 0.0;

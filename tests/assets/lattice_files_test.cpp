@@ -344,13 +344,14 @@ TEST(LatticeFiles, ABoneWithoutAChainOfEdgesIsRefusedUnlessItMayBeSoft) {
                                         "from vertex "),
                      testing::HasSubstr("m from it, expected at most 0.0002 m (1 such bones more: "
                                         "'lower'); hint: ")));
-  const lattice::ControlLattice in = read_lattice(file.path(), input, {.soft_bones = true});
+  const lattice::ControlLattice in = read_lattice(file.path(), input, {.bones = {.soft_bones = true}});
   EXPECT_TRUE(in.bones[0].soft);
   EXPECT_TRUE(in.bones[1].soft);
   EXPECT_THAT(in.changes, testing::Contains(testing::Field(&lattice::SkeletonChange::reason,
                                                            testing::HasSubstr("is no chain of edges"))));
   // Snapping reaches it: 2 mm of 2 m are 1e-3.
-  const lattice::ControlLattice snapped = read_lattice(file.path(), input, {.snap_tolerance = 1.1e-3});
+  const lattice::ControlLattice snapped =
+      read_lattice(file.path(), input, {.bones = {.snap_tolerance = 1.1e-3}});
   EXPECT_EQ(snapped.bones[0].chain, out.bones[0].chain);
   expect_same_bits(snapped.complex.points.row(elbow).transpose(), input.joints.positions.row(1).transpose());
 }

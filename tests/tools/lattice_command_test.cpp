@@ -74,7 +74,11 @@ TEST_F(LatticeCommand, WritesTheFileAndReportsAsJson) {
   }
   EXPECT_EQ(json["tip_bones"].size(), 1u);
   EXPECT_EQ(json["quality"]["skin_vertices_outside"], 0);
-  EXPECT_EQ(num_files(), 1);
+  EXPECT_EQ(num_files(), 2);  // and the picture
+  std::ifstream picture(folder_ + "/arm.vtu.png", std::ios::binary);
+  std::string magic(8, ' ');
+  picture.read(magic.data(), 8);
+  EXPECT_EQ(magic, "\x89PNG\r\n\x1a\n");
 }
 
 TEST_F(LatticeCommand, KeepsAFileThatIsThereUnlessToldOtherwise) {
@@ -89,7 +93,10 @@ TEST_F(LatticeCommand, KeepsAFileThatIsThereUnlessToldOtherwise) {
 
 TEST_F(LatticeCommand, RefusesBadValuesWithOneLineAndNoFile) {
   const std::pair<const char*, std::pair<int, const char*>> cases[] = {
-      {"-o arm.stl", {2, "sinew: arm.stl: extension, got '.stl', expected '.vtu' or '.mesh'\n"}},
+      {"-o arm.stl",
+       {2, "sinew: arm.stl: extension, got '.stl', expected .vtu, .vtk, .msh, .mesh, .node, .ele or .veg\n"}},
+      {"-o a.msh --format vtk", {2, "sinew: --format: got 'vtk', which does not fit the extension '.msh'\n"}},
+      {"-o a.msh --snap-tolerance 2", {2, "sinew: --snap-tolerance: got 2, expected 0 < tolerance <= 0.1\n"}},
       {"-o a.vtu --cells 3",
        {2, "sinew: --cells: got 3, expected 20 ... 1000000; hint: 1000 cells suffice for most characters\n"}},
       {"-o a.vtu --cells 2000000",
