@@ -96,13 +96,13 @@ class Scripts(unittest.TestCase):
         self.assertEqual([call.split(" ")[4] for call in calls], ["update", "install"])
         self.assertTrue(calls[1].endswith("install -y --no-install-recommends libfmt-dev"), calls[1])
 
-    def test_blender_is_wanted_by_all_only(self):
-        self.installed('[[ $* == *" blender" ]] || echo installed')
+    def test_large_packages_are_wanted_by_all_only(self):
+        self.installed('[[ $* == *" blender" || $* == *" python3-paraview" ]] || echo installed')
         self.run_script("tools/test")
         self.assertEqual(self.called("apt-get"), [])
-        self.assertTrue(self.called("ctest")[0].endswith("--label-exclude ^(bench|nightly|blender|shared)$"))
+        self.assertTrue(self.called("ctest")[0].endswith("--label-exclude ^(bench|nightly|blender|paraview|shared)$"))
         self.run_script("tools/test", "--all")
-        self.assertTrue(self.called("apt-get")[-1].endswith(" blender"))
+        self.assertTrue(self.called("apt-get")[-1].endswith(" blender python3-paraview"))
         self.assertTrue(self.called("ctest")[1].endswith("--label-exclude ^(bench|nightly|shared)$"))
 
     def test_shared_tests_run_where_the_folder_is(self):
@@ -111,7 +111,7 @@ class Scripts(unittest.TestCase):
         os.mkdir(os.path.join(self.folder, "shared"))
         result = self.run_script("tools/test")
         self.assertNotIn("absent", result.stdout)
-        self.assertTrue(self.called("ctest")[1].endswith("--label-exclude ^(bench|nightly|blender)$"))
+        self.assertTrue(self.called("ctest")[1].endswith("--label-exclude ^(bench|nightly|blender|paraview)$"))
 
     def test_ci_demands_the_shared_folder_and_runs_everything(self):
         self.expect_failure(self.run_script(".ci/run"), 5,
