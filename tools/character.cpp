@@ -98,6 +98,14 @@ void settle_materials(const Scene& scene, Character& c) {
 
 }  // namespace
 
+assets::ReadLatticeOptions read_options(const Scene& scene, const assets::Rig& rig) {
+  assets::ReadLatticeOptions options;
+  options.bones.snap_tolerance = scene.snap_tolerance;
+  options.bones.soft_bones = scene.soft_bones;
+  if (scene.lattice_space == OutputSpace::File) options.rig_from_file = rig.rig_from_file;
+  return options;
+}
+
 std::vector<Eigen::Affine3d> Character::pose(double time) const {
   return skeleton::pose_from_rest(rig.skeleton, skeleton::sample(rig.skeleton, the_clip(), time));
 }
@@ -150,18 +158,14 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
     const lattice::BuildOptions options = build_options(scene, c.input.joints.names);
     if (scene.lattice.empty()) {
       const std::string folder =
-          scene.no_cache || scene.output.empty() ? "" : assets::cache_folder(scene.output);
+          scene.cache == Switch::Off || scene.output.empty() ? "" : assets::cache_folder(scene.output);
       assets::CachedBuild built =
           assets::build_lattice(folder, c.input.skin.surface, c.input.joints, options);
       if (built.use == assets::CacheUse::Hit) talk("lattice: nothing changed, taken from " + folder);
       if (built.use == assets::CacheUse::Built) c.new_lattice_key = built.key;
       c.lattice = std::move(built.result);
     } else {
-      assets::ReadLatticeOptions read;
-      read.bones.snap_tolerance = scene.snap_tolerance;
-      read.bones.soft_bones = scene.soft_bones;
-      if (scene.lattice_space == OutputSpace::File) read.rig_from_file = c.rig.rig_from_file;
-      c.lattice.lattice = assets::read_lattice(scene.lattice, c.input, read);
+      c.lattice.lattice = assets::read_lattice(scene.lattice, c.input, read_options(scene, c.rig));
       c.lattice.failures = lattice::check_gate(c.lattice.lattice, c.input.skin.surface, options);
     }
   }

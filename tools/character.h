@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "assets/lattice_files.h"
 #include "assets/lattice_input.h"
 #include "assets/rig.h"
 #include "fem/simulation.h"
@@ -40,6 +41,9 @@ using Talk = std::function<void(const std::string&)>;
 /// Loads the rig, chooses the clip, builds or reads the lattice and settles the materials. Throws the errors
 /// of assets/error.h, and NumericalError where the lattice has a failure that a simulation cannot bear.
 Character make_character(const Scene& scene, const Talk& talk);
+
+/// How a lattice of the user's is read.
+assets::ReadLatticeOptions read_options(const Scene& scene, const assets::Rig& rig);
 
 /// The builder's options for a scene and the names of a rig's joints. Throws assets::ConfigError for a
 /// pattern that fits no joint, naming the nearest.

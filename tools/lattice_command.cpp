@@ -16,45 +16,38 @@
 #include "assets/lattice_input.h"
 #include "assets/lattice_picture.h"
 #include "assets/rig.h"
+#include "tools/character.h"
 #include "tools/command.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
+#include "tools/scene_flags.h"
 
 namespace sinew::tools {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kMinCells = 20, kMaxCells = 1'000'000;
-constexpr double kMinHeight = 1e-3, kMaxHeight = 1e4;  ///< [m], as the scene's.
+/// Keys of a scene that this command knows.
+constexpr std::string_view kKeys[] = {"output",        "overwrite",     "json",           "preview",
+                                      "lattice",       "lattice_space", "snap_tolerance", "soft_bones",
+                                      "cache",         "cells",         "cell_size",      "bones_include",
+                                      "bones_exclude", "tip_bones",     "symmetry",       "height"};
 
 Json to_json(const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
-std::string picture_name(const LatticeRequest& request) { return request.output + ".png"; }
+std::string picture_name(const LatticeRequest& request) { return request.scene.output + ".png"; }
 
 void check_request(const LatticeRequest& request) {
-  if (request.cells < kMinCells)
-    throw assets::ConfigError(
-        fmt::format("--cells: got {}, expected {} ... {}; hint: 1000 cells suffice for most "
-                    "characters",
-                    request.cells, kMinCells, kMaxCells));
-  if (request.cells > kMaxCells)
-    throw assets::LimitError(
-        fmt::format("--cells: got {}, the limit is {} cells; hint: 1000 cells suffice for most "
-                    "characters",
-                    request.cells, kMaxCells));
-  if (request.height && !(*request.height >= kMinHeight && *request.height <= kMaxHeight))
-    throw assets::ConfigError(
-        fmt::format("--height: got {}, expected {} ... {} [m]", *request.height, kMinHeight, kMaxHeight));
-  if (!(request.snap_tolerance > 0.0 && request.snap_tolerance <= 0.1))
-    throw assets::ConfigError(
-        fmt::format("--snap-tolerance: got {}, expected 0 < tolerance <= 0.1", request.snap_tolerance));
-  assets::lattice_format(request.output, request.format);
-  std::vector<std::string> files = assets::lattice_file_names(request.output);
-  if (!request.no_picture) files.push_back(picture_name(request));
+  const Scene& scene = request.scene;
+  scene.validate();
+  if (scene.output.empty())
+    throw assets::ConfigError("--output: missing, expected a lattice file to write; hint: -o character.vtu");
+  assets::lattice_format(scene.output, request.format);
+  std::vector<std::string> files = assets::lattice_file_names(scene.output);
+  if (scene.preview == Switch::On) files.push_back(picture_name(request));
   for (const std::string& file : files) {
     std::error_code ignored;
-    if (!request.overwrite && std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
+    if (!scene.overwrite && std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
       throw assets::BusyError(file + ": is there already; hint: give --overwrite or another name");
   }
 }
@@ -71,14 +64,14 @@ std::string gate_message(const std::string& rig, const lattice::BuildResult& res
       shown.what, more, result.lattice.retries, 2 * result.lattice.complex.cells.size());
 }
 
-void print_summary(const LatticeRequest& request, const lattice::ControlLattice& lattice, double seconds) {
+void print_summary(const std::string& output, const lattice::ControlLattice& lattice, double seconds) {
   const lattice::LatticeQuality& q = lattice.quality;
   int hard = 0, tips = 0, soft = 0;
   for (const lattice::LatticeBone& bone : lattice.bones) {
     ++(bone.soft ? soft : hard);
     tips += bone.tip;
   }
-  fmt::print(stderr, "{}: {} cells, {} vertices, edges of about {:.3g} m, in {:.2f} s\n", request.output,
+  fmt::print(stderr, "{}: {} cells, {} vertices, edges of about {:.3g} m, in {:.2f} s\n", output,
              lattice.complex.cells.size(), lattice.complex.points.rows(), lattice.edge_length, seconds);
   fmt::print(stderr, "  bones: {} on edges ({} of them tip bones), {} soft, {} soft frames\n", hard, tips,
              soft, lattice.soft_frames.size());
@@ -142,56 +135,51 @@ std::string lattice_report(const lattice::ControlLattice& lattice, const lattice
 namespace {
 
 /// The user's lattice, or one that is built or found in the cache.
-assets::CachedBuild make_lattice(const LatticeRequest& request, const assets::Rig& rig,
+assets::CachedBuild make_lattice(const Scene& scene, const assets::Rig& rig,
                                  const assets::LatticeInput& input) {
-  lattice::BuildOptions options;
-  options.cells = request.cells;
+  const lattice::BuildOptions options = build_options(scene, input.joints.names);
   assets::CachedBuild built;
-  if (!request.lattice.empty()) {
-    assets::ReadLatticeOptions read;
-    read.bones.snap_tolerance = request.snap_tolerance;
-    read.bones.soft_bones = request.soft_bones;
-    if (request.lattice_in_file_space) read.rig_from_file = rig.rig_from_file;
-    built.result.lattice = assets::read_lattice(request.lattice, input, read);
+  if (!scene.lattice.empty()) {
+    built.result.lattice = assets::read_lattice(scene.lattice, input, read_options(scene, rig));
     for (const lattice::GateFailure& failure :
          lattice::check_gate(built.result.lattice, input.skin.surface, options))
-      fmt::print(stderr, "warning: {}: {}\n", request.lattice, failure.what);
+      fmt::print(stderr, "warning: {}: {}\n", scene.lattice, failure.what);
     return built;
   }
   try {
-    const std::string folder = request.no_cache ? "" : assets::cache_folder(request.output);
+    const std::string folder = scene.cache == Switch::Off ? "" : assets::cache_folder(scene.output);
     built = assets::build_lattice(folder, input.skin.surface, input.joints, options);
     if (built.use == assets::CacheUse::Hit)
       fmt::print(stderr, "lattice: nothing changed, taken from {}\n", single_line(folder));
   } catch (const std::invalid_argument& error) {
-    throw assets::InputError(request.rig, error.what());
+    throw assets::InputError(scene.rig, error.what());
   }
-  if (!built.result.failures.empty()) throw NumericalError(gate_message(request.rig, built.result));
+  if (!built.result.failures.empty()) throw NumericalError(gate_message(scene.rig, built.result));
   return built;
 }
 
 /// The picture first: the lattice under its name means that all is done.
 void write_outputs(const LatticeRequest& request, const lattice::ControlLattice& lattice,
                    const assets::LatticeInput& input) {
+  const Scene& scene = request.scene;
+  const bool has_picture = scene.preview == Switch::On;
   const assets::Overwrite overwrite =
-      request.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse;
-  const bool has_fields = std::filesystem::path(request.output).extension().string().starts_with(".vt");
+      scene.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse;
+  const bool has_fields = std::filesystem::path(scene.output).extension().string().starts_with(".vt");
   const assets::LatticeFields fields =
       has_fields ? assets::skin_fields(lattice, input.skin.surface) : assets::LatticeFields{};
-  if (!request.no_picture) {
+  if (has_picture) {
     assets::LatticePictureOptions picture;
-    picture.caption =
-        fmt::format("{}: lattice of {} cells", std::filesystem::path(request.rig).stem().string(),
-                    lattice.complex.cells.size());
-    assets::write_file(picture_name(request),
-                       assets::png_bytes(assets::render_lattice(lattice, input.skin.surface, picture)),
-                       overwrite);
+    picture.caption = fmt::format("{}: lattice of {} cells", std::filesystem::path(scene.rig).stem().string(),
+                                  lattice.complex.cells.size());
+    const assets::Image image = assets::render_lattice(lattice, input.skin.surface, picture);
+    assets::write_file(picture_name(request), assets::png_bytes(image), overwrite);
   }
   try {
-    assets::write_lattice(request.output, lattice, input.joints, overwrite, fields, request.format);
+    assets::write_lattice(scene.output, lattice, input.joints, overwrite, fields, request.format);
   } catch (...) {
     std::error_code ignored;
-    if (!request.no_picture) std::filesystem::remove(picture_name(request), ignored);
+    if (has_picture) std::filesystem::remove(picture_name(request), ignored);
     throw;
   }
 }
@@ -200,59 +188,37 @@ void write_outputs(const LatticeRequest& request, const lattice::ControlLattice&
 
 void run_lattice(const LatticeRequest& request) {
   check_request(request);
+  const Scene& scene = request.scene;
   const auto start = std::chrono::steady_clock::now();
   assets::LoadOptions load;
-  load.height = request.height.value_or(0.0);
-  const assets::Rig rig = assets::load_rig(request.rig, load);
+  load.height = scene.height.value_or(0.0);
+  const assets::Rig rig = assets::load_rig(scene.rig, load);
   const assets::LatticeInput input = assets::lattice_input(rig);
   stop_if_interrupted("before building the lattice");
-  const assets::CachedBuild built = make_lattice(request, rig, input);
+  const assets::CachedBuild built = make_lattice(scene, rig, input);
   const lattice::ControlLattice& lattice = built.result.lattice;
   stop_if_interrupted("before writing the lattice");
   write_outputs(request, lattice, input);
   if (built.use == assets::CacheUse::Built)
-    assets::keep_lattice(assets::cache_folder(request.output), built.key, built.result, input.joints);
-  if (request.json) std::cout << lattice_report(lattice, input.joints);
+    assets::keep_lattice(assets::cache_folder(scene.output), built.key, built.result, input.joints);
+  if (scene.json) std::cout << lattice_report(lattice, input.joints);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  print_summary(request, lattice, elapsed.count());
+  print_summary(scene.output, lattice, elapsed.count());
 }
 
 void add_lattice_command(CLI::App& app, CommandContext&) {
   auto request = std::make_shared<LatticeRequest>();
-  auto space = std::make_shared<std::string>("si");
+  auto flags = std::make_shared<SceneFlags>();
   CLI::App* command =
-      app.add_subcommand("lattice", "Build the control lattice of a rig and write it to a file.");
-  command->add_option("RIG", request->rig, "the character: glTF, FBX, Collada, ...")->required();
-  command
-      ->add_option("-o,--output", request->output,
-                   "file to write: .vtu or .vtk (ParaView), .msh (Gmsh), .mesh (Medit), .node with .ele "
-                   "(TetGen), .veg "
-                   "(Vega)")
-      ->required();
+      app.add_subcommand("lattice", "Build, check or convert the control lattice of a rig and look at it.");
+  command->add_option("RIG", request->scene.rig, "the character: glTF, FBX, Collada, ...")->required();
+  flags->add_to(*command, kKeys);
   command->add_option(
       "--format", request->format,
-      "vtk, vtk-binary, msh41, msh41-binary, msh22 or msh22-binary, where the extension leaves a "
-      "choice");
-  command->add_option("--cells", request->cells, "wanted number of cells, 20 ... 1000000")
-      ->capture_default_str();
-  command->add_option("--height", request->height,
-                      "height of the character [m]; guessed where it is not given");
-  command->add_option("--lattice", request->lattice,
-                      "check and write this lattice of yours instead of building one");
-  command->add_option("--lattice-space", *space, "its units and axes: si (metres, Y up) or file (the rig's)")
-      ->check(CLI::IsMember({"si", "file"}))
-      ->capture_default_str();
-  command
-      ->add_option("--snap-tolerance", request->snap_tolerance,
-                   "how far it may miss its bones, as a share of the character's size; 0 < tolerance <= 0.1")
-      ->capture_default_str();
-  command->add_flag("--soft-bones", request->soft_bones, "hold bones that are no edges of it by penalty");
-  command->add_flag("--no-picture", request->no_picture, "write no picture beside the file");
-  command->add_flag("--no-cache", request->no_cache, "build anew, and keep nothing for the next time");
-  command->add_flag("--overwrite", request->overwrite, "replace the file if it is there");
-  command->add_flag("--json", request->json, "print the lattice as JSON on stdout");
-  command->callback([request, space] {
-    request->lattice_in_file_space = *space == "file";
+      "vtk, vtk-binary, msh41, msh41-binary, msh22 or msh22-binary, where the extension of the "
+      "output (.vtu, .vtk, .msh, .mesh, .node, .ele, .veg) leaves a choice");
+  command->callback([request, flags] {
+    flags->apply(request->scene);
     run_lattice(*request);
   });
 }

@@ -1,28 +1,20 @@
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "lattice/build.h"
 #include "lattice/surface.h"
+#include "tools/scene.h"
 
 namespace sinew::tools {
 
 /// What `sinew lattice` is asked to do.
 struct LatticeRequest {
-  std::string rig;     ///< input file.
-  std::string output;  ///< lattice file to write; the picture is beside it, with .png behind its name.
-  std::string format;  ///< where the extension leaves a choice; empty: its default.
-  int cells = 1000;    ///< wanted [-]; 20 ... 1e6.
-  std::optional<double> height;  ///< of the character [m]; 1e-3 ... 1e4. Unset: guessed.
-  std::string lattice;           ///< a lattice of the user's to check and write instead of building one.
-  bool lattice_in_file_space = false;  ///< its units and axes are the rig file's; else metres, Y up.
-  double snap_tolerance = 1e-4;  ///< how far it may miss its bones, as a share of the skin's size; (0, 0.1].
-  bool soft_bones = false;       ///< bones that are no edges of it are held by penalty.
-  bool no_picture = false;
-  bool no_cache = false;
-  bool overwrite = false;
-  bool json = false;  ///< the lattice as JSON on stdout.
+  /// The rig, the output (a lattice file; the picture is beside it, with .png behind its name) and what
+  /// concerns the lattice: its size, joints, cache, or a lattice of the user's to check and write instead of
+  /// building one.
+  Scene scene;
+  std::string format;  ///< where the extension of the output leaves a choice; empty: its default.
 };
 
 /// Builds the lattice (or checks the user's) and writes it with its picture; data to stdout, talk to stderr.

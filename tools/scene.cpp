@@ -46,7 +46,7 @@ std::string print_material(const BoneMaterial& material) {
 bool is_of_characters(std::string_view key) {
   constexpr std::string_view kKeys[] = {
       "rig",      "clip",   "lattice",      "lattice_space", "snap_tolerance", "soft_bones",
-      "no_cache", "cells",  "cell_size",    "bones_include", "bones_exclude",  "tip_bones",
+      "cache",    "cells",  "cell_size",    "bones_include", "bones_exclude",  "tip_bones",
       "symmetry", "height", "output_space", "output_mesh"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }

@@ -75,8 +75,8 @@ struct Scene {
   double snap_tolerance = 1e-4;
   /// Bones that are no edges of such a file are held by penalty instead of being refused.
   bool soft_bones = false;
-  /// Neither take a built lattice from `.sinew-cache` beside the output nor keep one there.
-  bool no_cache = false;
+  /// Take a built lattice from `.sinew-cache` beside the output where nothing changed, and keep it there.
+  Switch cache = Switch::On;
   /// Wanted number of lattice cells [-]; 20 ... 1e6.
   int cells = 1000;
   /// Wanted edge of the lattice's cells [m]; 1e-4 ... 1e3. Set: `cells` is not used.

@@ -45,7 +45,7 @@ constexpr auto kFields = std::to_array<SceneField>({
      "",
      "1e-4"},
     {"soft_bones", &Scene::soft_bones, "hold bones that are no edges of a lattice of yours by penalty"},
-    {"no_cache", &Scene::no_cache, "build the lattice anew, and keep nothing for the next run"},
+    {"cache", &Scene::cache, "on or off: take the lattice of an earlier run where nothing changed"},
     {"cells", &Scene::cells, "wanted number of lattice cells", "cells", {20, kMaxCells}, "", "1000"},
     {"cell_size",
      &Scene::cell_size,

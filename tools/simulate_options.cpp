@@ -1,8 +1,6 @@
 #include "tools/simulate_options.h"
 
-#include <algorithm>
 #include <filesystem>
-#include <variant>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -10,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "assets/error.h"
-#include "tools/scene_fields.h"
 
 namespace sinew::tools {
 namespace {
@@ -23,37 +20,12 @@ bool is_scene_file(const std::string& file) {
   return extension == ".toml";
 }
 
-std::string help_with_default(const SceneField& field) {
-  const std::string value = flag_text(Scene{}, field);
-  return value.empty() ? help_text(field) : fmt::format("{} [{}]", help_text(field), value);
-}
-
-/// What stands for the value in --help.
-std::string placeholder(const SceneField& field) {
-  if (field.key == "output") return "DIR";
-  if (!field.unit.empty()) return std::string(field.unit);
-  if (std::holds_alternative<PathMember>(field.member)) return "FILE";
-  if (std::holds_alternative<int Scene::*>(field.member)) return "N";
-  if (std::holds_alternative<double Scene::*>(field.member)) return "X";
-  if (std::holds_alternative<std::optional<FrameRange> Scene::*>(field.member)) return "A-B";
-  return "NAME";
-}
-
 }  // namespace
 
 void SimulateOptions::add_to(CLI::App& command) {
   command.add_option("input", input_, "scene file (.toml), or a rig: glTF, GLB, FBX, Collada, ...")
       ->type_name("SCENE.toml|RIG");
-  for (const SceneField& field : scene_fields()) {
-    const std::string key(field.key);
-    if (key == "rig") continue;  // the positional argument
-    const std::string name = (key == "output" ? "-o," : "") + flag_name(field);
-    if (std::holds_alternative<bool Scene::*>(field.member)) {
-      command.add_flag(name, switches_[key], std::string(field.help));
-    } else {
-      command.add_option(name, flags_[key], help_with_default(field))->type_name(placeholder(field));
-    }
-  }
+  flags_.add_to(command);
   command.add_flag("--print-scene", print_scene_only_, "print the whole scene in force as TOML and stop");
 }
 
@@ -64,14 +36,7 @@ Scene SimulateOptions::scene() const {
   } else {
     scene.rig = input_;
   }
-  for (const auto& [key, text] : flags_) {
-    const SceneField& field = *find_scene_field(key);
-    if (text) set_from_text(scene, field, *text, flag_name(field));
-  }
-  for (const auto& [key, given] : switches_) {
-    const SceneField& field = *find_scene_field(key);
-    if (given) set_from_text(scene, field, "", flag_name(field));
-  }
+  flags_.apply(scene);
   scene.validate();
   if (print_scene_only_) return scene;
   if (scene.rig.empty() && !scene.plain) {

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <map>
-#include <optional>
 #include <string>
 
 #include "tools/scene.h"
+#include "tools/scene_flags.h"
 
 namespace CLI {
 class App;
@@ -29,9 +28,7 @@ class SimulateOptions {
  private:
   std::string input_;
   bool print_scene_only_ = false;
-  /// By key, in a std::map as the parser keeps the addresses.
-  std::map<std::string, std::optional<std::string>> flags_;
-  std::map<std::string, bool> switches_;
+  SceneFlags flags_;
 };
 
 }  // namespace sinew::tools

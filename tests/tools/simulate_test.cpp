@@ -19,7 +19,7 @@ TEST_F(Simulate, RunsEverySampleToSoundFrames) {
 }
 
 TEST_F(Simulate, GivesTheSameBitsForAnyNumberOfThreadsAndUnderACommaLocale) {
-  const std::string flags = "--frames 0-8 --cells 300 --no-cache";
+  const std::string flags = "--frames 0-8 --cells 300 --cache off";
   simulate("hopper", "one", flags + " --threads 1");
   const std::string one = read(out("one") / "skin.pc2");
   ASSERT_GT(one.size(), 1000u);

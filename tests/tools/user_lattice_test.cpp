@@ -27,7 +27,7 @@ class UserLattice : public Simulate {
 };
 
 TEST_F(UserLattice, GivesTheSameFramesFromEveryFormat) {
-  const Outcome built = lattice("arm.vtu", "--cells 100 --no-picture");
+  const Outcome built = lattice("arm.vtu", "--cells 100 --preview off");
   ASSERT_EQ(built.exit_code, 0) << built.text;
   const std::string expected = frames_with("vtu", "--lattice " + quoted(out("arm.vtu")));
   ASSERT_GT(expected.size(), 1000u);
@@ -38,7 +38,7 @@ TEST_F(UserLattice, GivesTheSameFramesFromEveryFormat) {
   for (const auto& [file, format] : formats) {
     SCOPED_TRACE(format);
     const Outcome written =
-        lattice(file, "--no-picture --lattice " + quoted(out("arm.vtu")) + " --format " + format);
+        lattice(file, "--preview off --lattice " + quoted(out("arm.vtu")) + " --format " + format);
     ASSERT_EQ(written.exit_code, 0) << written.text;
     EXPECT_TRUE(frames_with(format, "--lattice " + quoted(out(file))) == expected);
   }
@@ -46,7 +46,7 @@ TEST_F(UserLattice, GivesTheSameFramesFromEveryFormat) {
 
 /// A mesh as another program would hand it over: the bare cells of a built lattice, in the rig file's units.
 TEST_F(UserLattice, IsTakenFromOtherProgramsAndRefusedInOneLine) {
-  ASSERT_EQ(lattice("own.mesh", "--cells 100 --no-picture").exit_code, 0);
+  ASSERT_EQ(lattice("own.mesh", "--cells 100 --preview off").exit_code, 0);
   const std::string own = read(out("own.mesh"));
   const std::string bare = own.substr(0, own.find("\nEdges")) + "\nEnd\n";
   std::ofstream(out("bare.mesh")) << bare;
@@ -129,7 +129,7 @@ TEST_F(UserLattice, IsKeptBesideTheOutputAndTakenAgain) {
                                          " --frames 0-1 --settle 0 --cells 160"));
   EXPECT_EQ(other.text.find("nothing changed"), std::string::npos) << other.text;
   const Outcome off =
-      run(command_line("simulate " + quoted(rig_) + " -o " + quoted(out("four")) + " --no-cache " + flags));
+      run(command_line("simulate " + quoted(rig_) + " -o " + quoted(out("four")) + " --cache off " + flags));
   EXPECT_EQ(off.text.find("nothing changed"), std::string::npos) << off.text;
   EXPECT_TRUE(read(out("one") / "skin.pc2") == read(out("four") / "skin.pc2"));
 }
