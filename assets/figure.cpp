@@ -5,10 +5,8 @@
 #include <cstring>
 
 #include <fmt/format.h>
-#include <png.h>
 
 #include "assets/detail/base64.h"
-#include "assets/error.h"
 
 namespace sinew::assets {
 namespace {
@@ -152,22 +150,6 @@ Image draw_figure(const Figure& figure, int scale) {
   const Painter painter(image, scale);
   for (const auto& mark : figure.marks) std::visit(painter, mark);
   return image;
-}
-
-std::string png_bytes(const Image& image) {
-  png_image png{};
-  png.version = PNG_IMAGE_VERSION;
-  png.width = static_cast<png_uint_32>(image.width);
-  png.height = static_cast<png_uint_32>(image.height);
-  png.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = 0;
-  if (png_image_write_to_memory(&png, nullptr, &size, 0, image.rgb.data(), 0, nullptr) == 0)
-    throw IoError(std::string("a picture cannot be packed: ") + png.message);
-  std::string bytes(size, '\0');
-  if (png_image_write_to_memory(&png, bytes.data(), &size, 0, image.rgb.data(), 0, nullptr) == 0)
-    throw IoError(std::string("a picture cannot be packed: ") + png.message);
-  bytes.resize(size);
-  return bytes;
 }
 
 std::string png_data_uri(const Image& image) {

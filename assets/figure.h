@@ -53,8 +53,7 @@ std::string svg_text(const Figure& figure);
 /// The same as a picture, `scale` pixels per unit; text comes out in the built-in font.
 Image draw_figure(const Figure& figure, int scale = 2);
 
-/// A picture as PNG bytes, and as the address of an <img> that needs no file.
-std::string png_bytes(const Image& image);
+/// A picture as the address of an <img> that needs no file.
 std::string png_data_uri(const Image& image);
 
 /// Text for a page: & < > " as entities.

@@ -159,7 +159,7 @@ std::string png_bytes(const Image& image) {
     bytes.resize(size);
     if (png_image_write_to_memory(&png, pass == 0 ? nullptr : bytes.data(), &size, 0, image.rgb.data(), 0,
                                   nullptr) == 0)
-      throw std::runtime_error(std::string("PNG: ") + png.message);
+      throw IoError(std::string("a picture cannot be packed: ") + png.message);
   }
   bytes.resize(size);
   return bytes;

@@ -92,6 +92,15 @@ void expect_same_cells(const lattice::CellComplex& a, const lattice::CellComplex
   }
 }
 
+/// For files of other programs: vertices that stand for bones are put back on them, (1 - s) a + s b of
+/// coordinates below 2, which rounds at 4e-16 or less.
+void expect_nearly_same_cells(const lattice::CellComplex& a, const lattice::CellComplex& b) {
+  ASSERT_EQ(a.points.rows(), b.points.rows());
+  EXPECT_LT((a.points - b.points).cwiseAbs().maxCoeff(), 1e-15);
+  ASSERT_EQ(a.cells.size(), b.cells.size());
+  for (std::size_t c = 0; c < a.cells.size(); ++c) EXPECT_EQ(a.cells[c].vertices, b.cells[c].vertices);
+}
+
 TEST(Base64, MatchesTheVectorsOfRfc4648) {
   const std::pair<const char*, const char*> vectors[] = {
       {"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob", "Zm9vYg=="}, {"foobar", "Zm9vYmFy"}};
@@ -294,7 +303,7 @@ TEST(LatticeFiles, BonesAreFoundInTheEdgesOfEveryForeignFormat) {
     SCOPED_TRACE(format.format);
     const TemporaryFile file(format.file, foreign_text(out, format.format));
     const lattice::ControlLattice in = read_lattice(file.path(), input);
-    expect_same_cells(in.complex, out.complex);
+    expect_nearly_same_cells(in.complex, out.complex);
     ASSERT_EQ(in.bones.size(), out.bones.size());
     for (std::size_t b = 0; b < in.bones.size(); ++b)
       EXPECT_EQ(in.bones[b].chain, out.bones[b].chain) << out.bones[b].name;
@@ -326,8 +335,8 @@ TEST(LatticeFiles, TetgenFilesMayCountFromZeroOrFromOne) {
                          v[2] + first, v[3] + first);
     }
     const TemporaryFile node_file("t.node", node), ele_file("t.ele", ele + "# end\n");
-    expect_same_cells(read_lattice(node_file.path(), input).complex, out.complex);
-    expect_same_cells(read_lattice(ele_file.path(), input).complex, out.complex);
+    expect_nearly_same_cells(read_lattice(node_file.path(), input).complex, out.complex);
+    expect_nearly_same_cells(read_lattice(ele_file.path(), input).complex, out.complex);
   }
 }
 
@@ -478,7 +487,7 @@ TEST(LatticeFiles, CellsOfEitherOrientationAreTurnedOneByOne) {
   for (std::size_t c = 0; c < turned.complex.cells.size(); c += 3)
     std::swap(turned.complex.cells[c].vertices[0], turned.complex.cells[c].vertices[1]);
   const TemporaryFile file("turned.mesh", foreign_text(turned, "mesh"));
-  expect_same_cells(read_lattice(file.path(), input).complex, out.complex);
+  expect_nearly_same_cells(read_lattice(file.path(), input).complex, out.complex);
 }
 
 }  // namespace

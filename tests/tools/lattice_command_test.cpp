@@ -96,14 +96,16 @@ TEST_F(LatticeCommand, RefusesBadValuesWithOneLineAndNoFile) {
       {"-o arm.stl",
        {2, "sinew: arm.stl: extension, got '.stl', expected .vtu, .vtk, .msh, .mesh, .node, .ele or .veg\n"}},
       {"-o a.msh --format vtk", {2, "sinew: --format: got 'vtk', which does not fit the extension '.msh'\n"}},
-      {"-o a.msh --snap-tolerance 2", {2, "sinew: --snap-tolerance: got 2, expected 1e-12 <= tolerance <= 0.1; hint: 1e-4\n"}},
-      {"-o a.vtu --cells 3",
-       {2, "sinew: --cells: got 3, expected 20 <= cells <= 1000000; hint: 1000\n"}},
+      {"-o a.msh --snap-tolerance 2",
+       {2, "sinew: --snap-tolerance: got 2, expected 1e-12 <= tolerance <= 0.1; hint: 1e-4\n"}},
+      {"-o a.vtu --cells 3", {2, "sinew: --cells: got 3, expected 20 <= cells <= 1000000; hint: 1000\n"}},
       {"-o a.vtu --cells 2000000",
        {6,
-        "sinew: --cells: got 2000000, the limit is 1000000 cells; hint: 1000 cells suffice for most "
-        "characters\n"}},
-      {"-o a.vtu --height -1", {2, "sinew: --height: got -1, expected 0.001 <= height <= 10000 m; hint: 1.8\n"}}};
+        "sinew: --cells: got 2000000, the limit is 1000000 cells; that many would need at least 6 GB of "
+        "memory; "
+        "hint: 1000 cells suffice for most characters\n"}},
+      {"-o a.vtu --height -1",
+       {2, "sinew: --height: got -1, expected 0.001 <= height <= 10000 m; hint: 1.8\n"}}};
   for (const auto& [arguments, expected] : cases) {
     const Outcome outcome = run(arm_, arguments);
     EXPECT_EQ(outcome.exit_code, expected.first) << arguments;
