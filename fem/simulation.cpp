@@ -48,6 +48,7 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
       should_stop_(std::move(should_stop)),
       info_(model_named(options.model)),
       model_(info_->make(body, options.solver)),
+      loads_(body, options.loads),
       start_(start_time) {
   options_.validate();
   // Flesh without inertia stands at the end of every step; a start of BDF2 would extrapolate beyond it.
@@ -165,6 +166,13 @@ SimulationReport Simulation::settle() {
   return report;
 }
 
+void Simulation::set_velocity(const Points& velocity) {
+  Points v = velocity;
+  for (const BoneVertex& bone : body_.bones.vertices) v.row(bone.vertex) = state_.v.row(bone.vertex);
+  fill_inactive_leaves(body_, v);
+  state_.v = before_.v = v;
+}
+
 int Simulation::halvings_for(double begin, double h) const {
   if (!info_->dynamic) return 0;
   constexpr int kSamples = 4;  // a full turn within one step must not look like standing still
@@ -186,7 +194,7 @@ int Simulation::halvings_for(double begin, double h) const {
 }
 
 StageProblem Simulation::stage(const Points& x_h, const Points& v_h, const StagePoses& poses, double h,
-                               bool use_past) const {
+                               bool use_past) {
   StageProblem problem;
   problem.state = &state_;
   problem.x_h = &x_h;
@@ -195,6 +203,10 @@ StageProblem Simulation::stage(const Points& x_h, const Points& v_h, const Stage
   problem.h = h;
   problem.integrator = options_.integrator;
   problem.gravity = options_.gravity;
+  if (!options_.loads.empty()) {
+    force_ = loads_.at(state_.x);
+    problem.force = &force_;
+  }
   problem.use_past = use_past;
   return problem;
 }
@@ -318,8 +330,14 @@ Points Simulation::velocities_at(double time) const {
 Measures Simulation::measures_at(double time) const {
   const double span = state_.time - before_.time;
   const bool at_end = !(span > 0.0) || time >= state_.time;
-  return measure(body_, positions_at(time), velocities_at(time), at_end ? now_ : pose_at(time),
-                 options_.gravity);
+  const Points x = positions_at(time);
+  const PosedFrames pose = at_end ? now_ : pose_at(time);
+  Measures measures = measure(body_, x, velocities_at(time), pose, options_.gravity);
+  if (!model_->linear_in_frames()) {
+    measures.elastic = 0.0;
+    for (double energy : model_->cell_forces(x, pose).energy) measures.elastic += energy;
+  }
+  return measures;
 }
 
 }  // namespace sinew::fem

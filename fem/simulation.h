@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "fem/loads.h"
 #include "fem/measures.h"
 #include "fem/models/model.h"
 
@@ -26,6 +27,7 @@ struct SimulationOptions {
   /// Which model of the flesh steps: a name of the registry (fem/models/model.h).
   std::string model{kDefaultModel};
   SolverOptions solver;
+  Loads loads;  ///< from the start on; pressures follow the surface as it stands at the begin of every step.
 
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;
@@ -58,6 +60,10 @@ class Simulation {
   /// motion gives a frame that is not finite or has no volume; the state stays the last good one.
   [[nodiscard]] SimulationReport advance_to(double time);
 
+  /// Gives the flesh a velocity [m/s], num_vertices x 3, before the first step; bone vertices keep the
+  /// clip's.
+  void set_velocity(const lattice::Points& velocity);
+
   const State& state() const { return state_; }
   /// Leaf vertices at a time between the last two states, moved in bone coordinates; bone vertices exactly on
   /// the clip.
@@ -74,7 +80,7 @@ class Simulation {
   int halvings_for(double begin, double h) const;
   SimulationReport step_once(double h);
   StageProblem stage(const lattice::Points& x_h, const lattice::Points& v_h, const StagePoses& poses,
-                     double h, bool use_past) const;
+                     double h, bool use_past);
   SimulationReport failed(const SolveReport& solve) const;
   bool check(SimulationReport& report) const;
 
@@ -84,6 +90,8 @@ class Simulation {
   std::function<bool()> should_stop_;
   const ModelInfo* info_;
   std::unique_ptr<Model> model_;
+  LoadForces loads_;
+  lattice::Points force_;  ///< of the loads, in the stage under way.
   double start_ = 0.0;
   State state_, before_;     ///< now and one step earlier, for sampling.
   PosedFrames now_, past_;   ///< their poses.

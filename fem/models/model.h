@@ -77,6 +77,9 @@ class Model {
   /// What the model's law says of leaf positions x in a pose, without viscosity.
   virtual CellForces cell_forces(const lattice::Points& x, const PosedFrames& pose) = 0;
 
+  /// The law is linear in the rotations of the cells' frames, as fem/measures.h has it.
+  virtual bool linear_in_frames() const { return false; }
+
   virtual SolverCounts counts() const = 0;
 };
 

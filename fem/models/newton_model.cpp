@@ -211,7 +211,8 @@ SolveReport NewtonModel::solve(const Balance& balance, double tolerance, Points&
 }  // namespace
 
 CellStiffness CellEnergy::semidefinite_hessian(int cell, const CellPoints& x) const {
-  const Eigen::SelfAdjointEigenSolver<CellStiffness> eigen(hessian(cell, x));
+  // Of dynamic size: as fast, and far less to compile.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian(cell, x));
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
          eigen.eigenvectors().transpose();
 }

@@ -1,5 +1,7 @@
 #include "fem/models/rotated_stiffness.h"
 
+#include <cmath>
+
 #include <tbb/parallel_for.h>
 
 namespace sinew::fem {
@@ -19,6 +21,33 @@ std::vector<Eigen::Matrix3d> frame_rotations(const Body& body, const PosedFrames
   return rotations;
 }
 
+namespace {
+
+/// Polar rotation by Newton's iteration M <- (g M + M^-T / g) / 2 ([Higham86]), g the ratio of the norms: a
+/// few products where a singular value decomposition takes hundreds. Cells near collapse take the latter.
+Eigen::Matrix3d quick_polar_rotation(const Eigen::Matrix3d& matrix) {
+  constexpr double kFlat = 1e-4;      // of a volume: below, the iteration wastes its first steps
+  constexpr double kSettled = 1e-14;  // the next step is at rounding: convergence is quadratic
+  Eigen::Matrix3d m = matrix;
+  for (int k = 0; k < 30; ++k) {
+    Eigen::Matrix3d inverse;  // M^-T, the cofactors over the determinant
+    inverse.col(0) = m.col(1).cross(m.col(2));
+    inverse.col(1) = m.col(2).cross(m.col(0));
+    inverse.col(2) = m.col(0).cross(m.col(1));
+    const double det = m.col(0).dot(inverse.col(0)), norm = m.norm();
+    if (!(det > kFlat * norm * norm * norm)) break;
+    inverse /= det;
+    const double g = std::sqrt(inverse.norm() / norm);
+    const Eigen::Matrix3d next = 0.5 * (g * m + inverse / g);
+    const double change = (next - m).cwiseAbs().maxCoeff();
+    m = next;
+    if (change < kSettled) return m;
+  }
+  return polar_rotation(matrix);
+}
+
+}  // namespace
+
 PolarRotations::PolarRotations(const Body& body) : body_(body) {
   for (std::size_t c = 0; c < body.mesh.cells.size(); ++c) {
     const CellGeometry geometry =
@@ -32,7 +61,7 @@ PolarRotations::PolarRotations(const Body& body) : body_(body) {
 std::vector<Eigen::Matrix3d> PolarRotations::operator()(const Points& x) const {
   std::vector<Eigen::Matrix3d> rotations(mean_gradient_.size());
   tbb::parallel_for(std::size_t{0}, rotations.size(), [&](std::size_t c) {
-    rotations[c] = polar_rotation(cell_points(x, body_.mesh.cells[c]) * mean_gradient_[c]);
+    rotations[c] = quick_polar_rotation(cell_points(x, body_.mesh.cells[c]) * mean_gradient_[c]);
   });
   return rotations;
 }

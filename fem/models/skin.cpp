@@ -28,6 +28,8 @@ class Skin final : public Model {
     return RotatedStiffness(body_).forces(x, frame_rotations(body_, pose));
   }
 
+  bool linear_in_frames() const override { return true; }
+
   SolverCounts counts() const override {
     SolverCounts counts;
     counts.functions = body_.mesh.num_functions();

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "fem/placement.h"
 #include "fem/simulation.h"
 #include "tests/fem/arm.h"
 
@@ -58,6 +59,52 @@ TEST(Models, KeepBoneVerticesOnTheClip) {
       EXPECT_LE(simulation.measures_at(time).bone_residual, 1e-13) << model.name;
     }
   }
+}
+
+// A force per volume of density times g is gravity, in every model's own way of taking forces in; nothing
+// else differs, so the two runs agree to rounding, over 12 steps.
+TEST(Models, FeelABodyLoadAsTheyFeelGravity) {
+  const tests::Arm arm = tests::make_arm();
+  const Body body = tests::arm_body(arm, 60 * kDegree);
+  for (const ModelInfo& model : models()) {
+    if (!model.dynamic) continue;
+    const auto positions = [&](bool as_load) -> Points {
+      SimulationOptions options;
+      options.model = model.name;
+      if (as_load) {
+        options.loads.bodies = {{1000.0 * options.gravity}};
+        options.gravity.setZero();
+      }
+      Simulation simulation(
+          body, [](double) { return tests::arm_pose(30.0 * kDegree); }, 0.0, options);
+      EXPECT_EQ(simulation.advance_to(0.1).status, SimulationStatus::Ok) << model.name;
+      return simulation.state().x;
+    };
+    const Points weight = positions(false), load = positions(true);
+    EXPECT_GT((weight - skinned_positions(body, pose_frames(body.tree, tests::arm_pose(30.0 * kDegree), 0.0)))
+                  .rowwise()
+                  .norm()
+                  .maxCoeff(),
+              1e-3)
+        << model.name;
+    EXPECT_LE((weight - load).rowwise().norm().maxCoeff(), 1e-9) << model.name;
+  }
+}
+
+TEST(Models, StartWithTheVelocityGiven) {
+  const tests::Arm arm = tests::make_arm();
+  const Body body = tests::arm_body(arm, 60 * kDegree);
+  SimulationOptions options;
+  options.gravity.setZero();
+  options.model = "neo-hookean";
+  Simulation simulation(
+      body, [](double) { return tests::arm_pose(0.0); }, 0.0, options);
+  Points v = Points::Zero(body.mesh.num_vertices(), 3);
+  v.col(1).setConstant(0.2);
+  simulation.set_velocity(v);
+  for (const BoneVertex& bone : body.bones.vertices)
+    EXPECT_EQ(simulation.state().v.row(bone.vertex).norm(), 0.0);
+  EXPECT_NEAR(simulation.measures_at(0.0).largest_speed, 0.2, 1e-15);
 }
 
 // s_f T_f X, summed here by hand from the weights.
