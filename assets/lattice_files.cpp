@@ -98,7 +98,7 @@ VtuGrid make_grid(const ControlLattice& lattice, const std::string& json, const 
   grid.points = lattice.complex.points;
   grid.cells = lattice.complex.cells;
   std::vector<double> dihedral, jacobian, volume;
-  std::vector<std::int64_t> frame, bone_of_line,
+  std::vector<std::int64_t> frame, bone_of_line, place(grid.cells.size(), -1),
       bone_of_point(static_cast<std::size_t>(grid.points.rows()), -1);
   for (const Cell& cell : grid.cells) {
     Vector3d mean = Vector3d::Zero();
@@ -110,6 +110,7 @@ VtuGrid make_grid(const ControlLattice& lattice, const std::string& json, const 
   }
   std::vector<std::int64_t> region(lattice.regions.begin(), lattice.regions.end());
   if (region.empty()) region = frame;
+  for (const lattice::CellCopy& copy : lattice.copies) place[copy.cell] = copy.place;
   for (std::size_t b = 0; b < lattice.bones.size(); ++b) {
     const lattice::LatticeBone& bone = lattice.bones[b];
     if (bone.chain.empty()) continue;
@@ -128,7 +129,8 @@ VtuGrid make_grid(const ControlLattice& lattice, const std::string& json, const 
                       with_lines({"volume", 1, volume}, num_lines),
                       with_lines({"region", 1, region}, num_lines),
                       {"frame", 1, frame},
-                      {"bone", 1, bone}};
+                      {"bone", 1, bone},
+                      with_lines({"place", 1, place}, num_lines)};
   for (const VtuArray& array : fields.cells) grid.cell_arrays.push_back(with_lines(array, num_lines));
   grid.file_arrays = {{detail::kAnnotation, 1, std::vector<std::uint8_t>(json.begin(), json.end())}};
   return grid;

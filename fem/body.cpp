@@ -158,18 +158,25 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
 
   // Drop cells without flesh; embed again in what is left, since indices change.
   const lattice::SurfaceQuery query(input.skin.points, input.skin.triangles);
-  lattice::Embedding skin = lattice::embed(mesh, input.skin.points);
-  std::vector<lattice::FillFractions> fill = lattice::fill_fractions(mesh, query, options.shell * h);
+  const lattice::LeafLimbs limbs(input.lattice, hierarchy, mesh, input.skin);
+  const auto own_skin = [](const lattice::LeafLimbs& of) {
+    return [&of](int vertex, int cell) { return of.owns_vertex(cell, vertex); };
+  };
+  lattice::Embedding skin = lattice::embed(mesh, input.skin.points, own_skin(limbs));
+  std::vector<lattice::FillFractions> fill = lattice::fill_fractions(mesh, query, options.shell * h, &limbs);
   // A quarter of a level-1 cell: no octant that the skin crosses for more than a corner is overlooked.
   const double spacing = 0.125 * h * std::exp2(1 - std::max(1, options.levels));
-  lattice::fill_grazed_octants(
-      mesh, lattice::sample_triangles(input.skin.points, input.skin.triangles, spacing), fill);
+  const lattice::TriangleSamples samples =
+      lattice::sample_triangles(input.skin.points, input.skin.triangles, spacing);
+  lattice::fill_grazed_octants(mesh, samples.points, fill, [&](int sample, int cell) {
+    return limbs.owns_vertex(cell, samples.vertices[static_cast<std::size_t>(sample)]);
+  });
   std::vector<std::uint8_t> keep = lattice::filled_cells(fill, skin.cell);
   // A coarse cell stays or goes as a whole: were only some of its children kept, a level-0 hat could reach
   // kept cells without having its own vertex there, and it would be a combination of details.
   std::vector<std::uint8_t> keep_coarse(hierarchy.coarse().cells.size(), 0);
   const auto coarse_of = [&](std::size_t c) {
-    return static_cast<std::size_t>(hierarchy.coarse_cell(mesh.hex[c] >> (3 * (mesh.level[c] - 1))));
+    return static_cast<std::size_t>(lattice::coarse_cell(hierarchy, mesh, static_cast<int>(c)));
   };
   for (std::size_t c = 0; c < keep.size(); ++c) keep_coarse[coarse_of(c)] |= keep[c];
   rescue_bones(input.lattice, keep_coarse);
@@ -180,7 +187,8 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   }
   if (kept_fill.empty()) throw std::invalid_argument("no lattice cell holds any flesh");
   mesh = lattice::restrict_cells(hierarchy, mesh, keep);
-  skin = lattice::embed(mesh, input.skin.points);
+  const lattice::LeafLimbs kept_limbs(input.lattice, hierarchy, mesh, input.skin);
+  skin = lattice::embed(mesh, input.skin.points, own_skin(kept_limbs));
 
   FrameTree tree = frame_tree(input.lattice, input.skeleton, further_frames(input));
   BoneConstraints bones = bone_constraints(input.lattice, tree, hierarchy, mesh);
@@ -195,7 +203,8 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   std::vector<double> mu_of_frame;
   for (const Material& m : of_frame) mu_of_frame.push_back(m.mu());
   const LimbRadii radii(input.lattice, tree, input.skin, h);
-  std::vector<Tie> ties = add_ties(input.lattice, tree, radii, mesh, mu_of_frame, h, options.ties, matrices);
+  std::vector<Tie> ties =
+      add_ties(input.lattice, tree, radii, mesh, kept_limbs, mu_of_frame, h, options.ties, matrices);
 
   std::vector<PosedFrames> posed;
   for (const auto& pose : input.poses) posed.push_back(pose_frames(tree, pose, 0.0));

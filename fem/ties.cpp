@@ -37,18 +37,21 @@ bool tube_mass(const lattice::HexCorners& corners, const Tube& tube, CellMass& m
   return any;
 }
 
-Tie add_tie(const Tube& tube, int frame, double kappa, const lattice::LeafMesh& mesh,
-            LeafMatrices& matrices) {
+/// `joint` names the frame in the lattice.
+Tie add_tie(const Tube& tube, int frame, int joint, double kappa, const lattice::LeafMesh& mesh,
+            const lattice::LeafLimbs& limbs, LeafMatrices& matrices) {
   Tie tie;
   tie.frame = frame;
   tie.centre_rest = 0.5 * (tube.start + tube.end);
   std::map<int, std::pair<double, Eigen::Vector3d>> moments;
   CellMass mass;
-  for (const auto& cell : mesh.cells) {
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    const lattice::HexVertices& cell = mesh.cells[c];
     const lattice::HexCorners corners = lattice::hex_corners(mesh.points, cell);
     const Eigen::Vector3d centre = corners.colwise().mean().transpose();
     const double reach = (corners.rowwise() - centre.transpose()).rowwise().norm().maxCoeff();
     if (tube.distance(centre) > reach + tube.radius || !tube_mass(corners, tube, mass)) continue;
+    if (!limbs.owns_frame(static_cast<int>(c), joint, centre)) continue;
     for (std::size_t a = 0; a < 8; ++a) {
       auto& [zeroth, first] = moments.try_emplace(cell[a], 0.0, Eigen::Vector3d::Zero()).first->second;
       for (std::size_t b = 0; b < 8; ++b) {
@@ -71,8 +74,8 @@ Tie add_tie(const Tube& tube, int frame, double kappa, const lattice::LeafMesh& 
 
 std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
                           const LimbRadii& radii, const lattice::LeafMesh& mesh,
-                          const std::vector<double>& mu_of_frame, double edge_length,
-                          const TieOptions& options, LeafMatrices& matrices) {
+                          const lattice::LeafLimbs& limbs, const std::vector<double>& mu_of_frame,
+                          double edge_length, const TieOptions& options, LeafMatrices& matrices) {
   std::vector<Tie> ties;
   const double smallest = 0.25 * edge_length;
   for (int b = 0; b < static_cast<int>(lattice.bones.size()); ++b) {
@@ -82,14 +85,16 @@ std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTre
     if (c == 0.0) continue;
     const double radius = std::max(options.radius * radii.of_bone(b), smallest);
     const double kappa = c * mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
-    ties.push_back(add_tie({bone.rest_start, bone.rest_end, radius}, frame, kappa, mesh, matrices));
+    ties.push_back(
+        add_tie({bone.rest_start, bone.rest_end, radius}, frame, bone.frame, kappa, mesh, limbs, matrices));
   }
   for (const auto& soft : lattice.soft_frames) {
     const int frame = tree.frame_of_joint[static_cast<std::size_t>(soft.frame)];
     const double radius = 0.5 * edge_length;
     const double kappa =
         options.soft_stiffness * mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
-    ties.push_back(add_tie({soft.position, soft.position, radius}, frame, kappa, mesh, matrices));
+    ties.push_back(
+        add_tie({soft.position, soft.position, radius}, frame, soft.frame, kappa, mesh, limbs, matrices));
   }
   std::erase_if(ties, [](const Tie& tie) { return tie.vertices.empty(); });
   return ties;

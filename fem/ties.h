@@ -5,6 +5,7 @@
 #include "fem/frames.h"
 #include "fem/leaf_matrices.h"
 #include "fem/limb_radius.h"
+#include "lattice/leaf_limbs.h"
 
 /// Penalties that tie flesh to a frame: the twist penalty of hard bones, soft bones and soft frames
 /// ([Capell02, sec. 5.3] for the need; the tube is ours).
@@ -28,10 +29,11 @@ struct Tie {
 };
 
 /// Adds the ties' matrices to matrices.tie (P = sum_b P_b) and returns their targets. The tube's radius does
-/// not depend on the active level: at least a quarter of `edge_length` (half a level-1 cell).
+/// not depend on the active level: at least a quarter of `edge_length` (half a level-1 cell). Of cells that
+/// coincide only the one of the tie's own limb (`limbs`) is held.
 std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
                           const LimbRadii& radii, const lattice::LeafMesh& mesh,
-                          const std::vector<double>& mu_of_frame, double edge_length,
-                          const TieOptions& options, LeafMatrices& matrices);
+                          const lattice::LeafLimbs& limbs, const std::vector<double>& mu_of_frame,
+                          double edge_length, const TieOptions& options, LeafMatrices& matrices);
 
 }  // namespace sinew::fem

@@ -157,4 +157,9 @@ LeafMesh restrict_cells(const Hierarchy& hierarchy, const LeafMesh& mesh,
   return finish(hierarchy, refs, active);
 }
 
+int coarse_cell(const Hierarchy& hierarchy, const LeafMesh& mesh, int cell) {
+  const auto c = static_cast<std::size_t>(cell);
+  return hierarchy.coarse_cell(mesh.hex[c] >> (3 * (mesh.level[c] - 1)));
+}
+
 }  // namespace sinew::lattice

@@ -43,6 +43,9 @@ struct LeafMesh {
   int num_functions() const { return static_cast<int>(functions.size()); }
 };
 
+/// The cell of level 0 from which a leaf cell comes.
+int coarse_cell(const Hierarchy& hierarchy, const LeafMesh& mesh, int cell);
+
 /// Throws std::invalid_argument where a level-0 function is inactive (they are always needed: they carry
 /// affine motion) or the set has the wrong length.
 LeafMesh leaf_mesh(const Hierarchy& hierarchy, const ActiveSet& active);

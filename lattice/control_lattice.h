@@ -96,11 +96,21 @@ struct RegionName {
   std::string name;
 };
 
+/// One of several coincident cells: limbs that lie side by side in one place have a cell each, so that they
+/// move apart. Its vertices coincide with those of the other copies, where they are not the same.
+struct CellCopy {
+  int cell = -1;            ///< index among the cells.
+  int place = -1;           ///< smallest cell index among the copies that coincide.
+  std::vector<int> frames;  ///< joints whose flesh it holds, ascending; no two copies of a place share one.
+};
+
 /// The whole product of the builder or of a reader.
 struct ControlLattice {
   CellComplex complex;
   std::vector<LatticeBone> bones;  ///< hard and soft.
   std::vector<SoftFrame> soft_frames;
+  /// Every cell that coincides with another one, ascending by cell; each place is named at least twice.
+  std::vector<CellCopy> copies;
   std::vector<SkeletonChange> changes;
   LatticeQuality quality;
   /// For every joint of the tree: the frame (a joint index that owns a bone or a soft frame) that its skin

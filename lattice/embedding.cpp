@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -36,11 +37,17 @@ class CellBins {
     }
   }
 
-  /// The cell whose box is nearest to p; the smallest index where several are.
-  int nearest(const Eigen::Vector3d& p) const {
-    const auto distance = [&](const Box& box) { return box.squaredExteriorDistance(p); };
-    const auto closer = [&](const Box& a, const Box& b) { return distance(a) < distance(b); };
-    return static_cast<int>(std::min_element(boxes_.begin(), boxes_.end(), closer) - boxes_.begin());
+  /// The cell that may hold p whose box is nearest; the smallest index where several are. MayHold: (int) ->
+  /// bool; where it takes none, cell 0.
+  template <class MayHold>
+  int nearest(const Eigen::Vector3d& p, const MayHold& may_hold) const {
+    int cell = 0;
+    double smallest = std::numeric_limits<double>::infinity();
+    for (int c = 0; c < static_cast<int>(boxes_.size()); ++c) {
+      const double distance_squared = box(c).squaredExteriorDistance(p);
+      if (distance_squared < smallest && may_hold(c)) smallest = distance_squared, cell = c;
+    }
+    return cell;
   }
 
   const Box& box(int cell) const { return boxes_[static_cast<std::size_t>(cell)]; }
@@ -93,11 +100,15 @@ struct Place {
 };
 
 /// The cell among `candidates` that p leaves least, in local coordinates; stops at the first that holds it.
-Place best_place(const LeafMesh& mesh, const std::vector<int>& candidates, const Eigen::Vector3d& p) {
+/// MayHold: (int cell) -> bool.
+template <class MayHold>
+Place best_place(const LeafMesh& mesh, const std::vector<int>& candidates, const Eigen::Vector3d& p,
+                 const MayHold& may_hold) {
   constexpr double kInside =
       1e-9;  // local coordinates; far below any visible distance, above Newton's rounding
   Place best;
   for (int cell : candidates) {
+    if (!may_hold(cell)) continue;
     const LocalCoordinates local =
         invert_trilinear(hex_corners(mesh.points, mesh.cells[static_cast<std::size_t>(cell)]), p);
     if (!local.converged) continue;
@@ -130,7 +141,7 @@ void check_input(const LeafMesh& mesh, const Points& points) {
 
 }  // namespace
 
-Embedding embed(const LeafMesh& mesh, const Points& points) {
+Embedding embed(const LeafMesh& mesh, const Points& points, const CellFilter& may_hold) {
   check_input(mesh, points);
   Embedding embedding;
   const auto n = points.rows();
@@ -141,16 +152,17 @@ Embedding embed(const LeafMesh& mesh, const Points& points) {
   triplets.reserve(8 * static_cast<std::size_t>(n));
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Vector3d p = points.row(i).transpose();
-    Place place = best_place(mesh, bins.near(p, 1e-9 * bins.size()), p);
+    const auto accept = [&](int cell) { return !may_hold || may_hold(static_cast<int>(i), cell); };
+    Place place = best_place(mesh, bins.near(p, 1e-9 * bins.size()), p, accept);
     if (place.cell < 0 || place.local.outside > 1e-9) {
       embedding.outside.push_back(static_cast<int>(i));
       // Widen until some cell is near enough; Newton's method does not reach farther than this.
       for (double reach = 0.25 * bins.size(); reach < 16.0 * bins.size(); reach *= 2.0) {
-        const Place wider = best_place(mesh, bins.near(p, reach), p);
+        const Place wider = best_place(mesh, bins.near(p, reach), p, accept);
         if (wider.cell >= 0 && (place.cell < 0 || wider.local.outside < place.local.outside)) place = wider;
         if (place.cell >= 0) break;
       }
-      if (place.cell < 0) place = affine_place(mesh, bins.nearest(p), p);
+      if (place.cell < 0) place = affine_place(mesh, bins.nearest(p, accept), p);
     }
     embedding.cell[static_cast<std::size_t>(i)] = place.cell;
     embedding.xi.row(i) = place.local.xi.transpose();

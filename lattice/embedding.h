@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/SparseCore>
@@ -20,9 +21,13 @@ struct Embedding {
   std::vector<int> outside;
 };
 
+/// Whether a point (row of the input) may lie in a leaf cell.
+using CellFilter = std::function<bool(int point, int cell)>;
+
 /// Embeds `points` (num_points x 3 [m]) in the leaf cells. Reproduces each point to 1e-12 of the lattice's
-/// size where Newton's method converges. A point on a shared face goes to the cell with the smaller index.
-/// Throws std::invalid_argument where a point is not finite or the lattice has no cells.
-Embedding embed(const LeafMesh& mesh, const Points& points);
+/// size where Newton's method converges. A point on a shared face goes to the cell with the smaller index;
+/// where cells coincide, `may_hold` chooses between them. Throws std::invalid_argument where a point is not
+/// finite or the lattice has no cells.
+Embedding embed(const LeafMesh& mesh, const Points& points, const CellFilter& may_hold = {});
 
 }  // namespace sinew::lattice

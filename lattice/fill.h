@@ -3,7 +3,8 @@
 #include <array>
 #include <vector>
 
-#include "lattice/basis.h"
+#include "lattice/embedding.h"
+#include "lattice/leaf_limbs.h"
 #include "lattice/surface_query.h"
 
 /// How much of each leaf cell is flesh.
@@ -14,19 +15,27 @@ namespace sinew::lattice {
 using FillFractions = std::array<double, 8>;
 
 /// 4x4x4 samples per leaf cell, eight in each octant. A sample is material if its winding number exceeds 0.5
-/// or it lies within `shell` [m] of the surface (open sheets have no inside). One entry per leaf cell.
-std::vector<FillFractions> fill_fractions(const LeafMesh& mesh, const SurfaceQuery& skin, double shell);
+/// or it lies within `shell` [m] of the surface (open sheets have no inside). Where cells coincide, `limbs`
+/// says which of them a sample belongs to. One entry per leaf cell.
+std::vector<FillFractions> fill_fractions(const LeafMesh& mesh, const SurfaceQuery& skin, double shell,
+                                          const LeafLimbs* limbs = nullptr);
 
 /// Points on every triangle, no farther than `spacing` [m] from their neighbours; corners included.
-Points sample_triangles(const Points& points, const Triangles& triangles, double spacing);
+struct TriangleSamples {
+  Points points;              ///< num_samples x 3 [m].
+  std::vector<int> vertices;  ///< per sample the nearest corner of its triangle.
+};
+TriangleSamples sample_triangles(const Points& points, const Triangles& triangles, double spacing);
 
 /// What an octant holds at least if the skin passes through it: half of one sample's share, the mean of what
 /// eight samples overlook. Without it a thin part (an ear, a fin) between samples would hang on next to
 /// nothing.
 inline constexpr double kGrazedFill = 1.0 / 16.0;
 
-/// Raises the fill of every octant that holds one of the `samples` of the skin to kGrazedFill.
-void fill_grazed_octants(const LeafMesh& mesh, const Points& samples, std::vector<FillFractions>& fill);
+/// Raises the fill of every octant that holds one of the `samples` of the skin to kGrazedFill; `may_hold` as
+/// of embed().
+void fill_grazed_octants(const LeafMesh& mesh, const Points& samples, std::vector<FillFractions>& fill,
+                         const CellFilter& may_hold = {});
 
 /// Flags the leaf cells that stay: any fill, or a point embedded in it (`embedded_cells`: cell indices, e.g.
 /// Embedding::cell).

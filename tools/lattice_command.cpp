@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <set>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -81,6 +82,12 @@ void print_summary(const std::string& output, const lattice::ControlLattice& lat
       "the skin's, {} component{}, {} retries\n",
       q.min_dihedral_degrees, q.min_scaled_jacobian, q.volume_ratio, q.components,
       q.components == 1 ? "" : "s", lattice.retries);
+  if (!lattice.copies.empty()) {
+    std::set<int> places;
+    for (const lattice::CellCopy& copy : lattice.copies) places.insert(copy.place);
+    fmt::print(stderr, "  limbs: {} places are shared and have a cell for each limb, {} in all\n",
+               places.size(), lattice.copies.size());
+  }
   for (const lattice::SkeletonChange& change : lattice.changes)
     fmt::print(stderr, "  {}: {}: {}\n", single_line(change.joint), change.what, single_line(change.reason));
 }
@@ -115,6 +122,15 @@ std::string lattice_report(const lattice::ControlLattice& lattice, const lattice
   for (const lattice::SoftFrame& frame : lattice.soft_frames)
     json["soft_frames"].push_back(
         {{"frame", joints.names[frame.frame]}, {"position", to_json(frame.position)}});
+  json["copies"] = Json::array();
+  std::set<int> places;
+  for (const lattice::CellCopy& copy : lattice.copies) {
+    Json frames = Json::array();
+    for (int frame : copy.frames) frames.push_back(joints.names[frame]);
+    json["copies"].push_back({{"cell", copy.cell}, {"place", copy.place}, {"frames", frames}});
+    places.insert(copy.place);
+  }
+  json["separation"] = {{"shared_places", places.size()}, {"cells_in_them", lattice.copies.size()}};
   json["changes"] = Json::array();
   for (const lattice::SkeletonChange& change : lattice.changes)
     json["changes"].push_back({{"joint", change.joint}, {"what", change.what}, {"reason", change.reason}});

@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Eigen::Vector3d;
 
-constexpr int kVersion = 2;  // 2: regions, coincident vertices
+constexpr int kVersion = 2;  // 2: regions, coincident vertices, copies
 
 Json to_json(const Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
@@ -142,6 +142,27 @@ void restore_order(const std::vector<int>& order, const JsonReader& reader,
   cells = std::move(restored);
 }
 
+Json copy_to_json(const lattice::CellCopy& copy, const std::vector<std::string>& names) {
+  Json frames = Json::array();
+  for (int frame : copy.frames) frames.push_back(names[frame]);
+  return {{"cell", copy.cell}, {"place", copy.place}, {"frames", frames}};
+}
+
+lattice::CellCopy copy_from_json(const Json& json, const JsonReader& reader,
+                                 const lattice::CellComplex& complex) {
+  lattice::CellCopy copy;
+  copy.cell = reader.get<int>(json, "cell");
+  copy.place = reader.get<int>(json, "place");
+  for (const int cell : {copy.cell, copy.place})
+    if (cell < 0 || cell >= static_cast<int>(complex.cells.size()))
+      reader.fail("key 'copies': cell " + std::to_string(cell) + " is not in 0.." +
+                  std::to_string(complex.cells.size() - 1));
+  for (const std::string& name : reader.get<std::vector<std::string>>(json, "frames"))
+    copy.frames.push_back(reader.joint(name));
+  std::sort(copy.frames.begin(), copy.frames.end());
+  return copy;
+}
+
 }  // namespace
 
 std::string lattice_to_json(const lattice::ControlLattice& lattice, const lattice::JointTree& joints,
@@ -157,6 +178,9 @@ std::string lattice_to_json(const lattice::ControlLattice& lattice, const lattic
   for (const lattice::SoftFrame& frame : lattice.soft_frames)
     json["soft_frames"].push_back(
         {{"frame", joints.names[frame.frame]}, {"position", to_json(frame.position)}});
+  json["copies"] = Json::array();
+  for (const lattice::CellCopy& copy : lattice.copies)
+    json["copies"].push_back(copy_to_json(copy, joints.names));
   json["changes"] = Json::array();
   for (const lattice::SkeletonChange& change : lattice.changes)
     json["changes"].push_back({{"joint", change.joint}, {"what", change.what}, {"reason", change.reason}});
@@ -187,6 +211,8 @@ lattice::Coincidence lattice_from_json(const std::string& where, const std::stri
   for (const Json& bone : reader.at(json, "bones")) lattice.bones.push_back(bone_from_json(bone, reader));
   for (const Json& frame : reader.at(json, "soft_frames"))
     lattice.soft_frames.push_back({reader.joint(frame, "frame"), reader.point(frame, "position")});
+  for (const Json& copy : reader.at(json, "copies"))
+    lattice.copies.push_back(copy_from_json(copy, reader, lattice.complex));
   for (const Json& change : reader.at(json, "changes"))
     lattice.changes.push_back({reader.get<std::string>(change, "joint"),
                                reader.get<std::string>(change, "what"),

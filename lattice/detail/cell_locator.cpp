@@ -12,6 +12,8 @@ using Eigen::Vector3d;
 
 /// Grid cells per lattice cell: about one.
 constexpr int kLargestGrid = 200;
+/// Points this near a cell's box look at it, in units of the grid: more than any slack of the callers.
+constexpr double kMargin = 1e-6;
 
 }  // namespace
 
@@ -53,7 +55,8 @@ CellLocator::CellLocator(const CellComplex& complex) : complex_(complex) {
       low = low.cwiseMin(complex.points.row(cell.vertices[k]).transpose());
       high = high.cwiseMax(complex.points.row(cell.vertices[k]).transpose());
     }
-    const Eigen::Vector3i first = grid_cell(low), last = grid_cell(high);
+    const Vector3d margin = Vector3d::Constant(kMargin * side_);
+    const Eigen::Vector3i first = grid_cell(low - margin), last = grid_cell(high + margin);
     for (int i = first.x(); i <= last.x(); ++i)
       for (int j = first.y(); j <= last.y(); ++j)
         for (int k = first.z(); k <= last.z(); ++k)
@@ -71,6 +74,13 @@ int CellLocator::find(const Vector3d& p, double slack) const {
   for (int c : cells_[(g.x() * count_.y() + g.y()) * count_.z() + g.z()])
     if (cell_contains(complex_, complex_.cells[c], p, slack)) return c;
   return -1;
+}
+
+void CellLocator::find_all(const Vector3d& p, double slack, std::vector<int>& cells) const {
+  cells.clear();
+  const Eigen::Vector3i g = grid_cell(p);
+  for (int c : cells_[(g.x() * count_.y() + g.y()) * count_.z() + g.z()])
+    if (cell_contains(complex_, complex_.cells[c], p, slack)) cells.push_back(c);
 }
 
 }  // namespace sinew::lattice::detail

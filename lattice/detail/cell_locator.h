@@ -18,6 +18,8 @@ class CellLocator {
 
   /// Index of the first cell that holds p, or -1.
   int find(const Eigen::Vector3d& p, double slack) const;
+  /// All cells that hold p, ascending.
+  void find_all(const Eigen::Vector3d& p, double slack, std::vector<int>& cells) const;
 
  private:
   Eigen::Vector3i grid_cell(const Eigen::Vector3d& p) const;

@@ -1,11 +1,13 @@
 #include "lattice/detail/finish.h"
 
 #include <algorithm>
+#include <set>
 
 #include <fmt/format.h>
 
 #include "lattice/detail/cell_locator.h"
 #include "lattice/detail/inspection.h"
+#include "lattice/limb_copies.h"
 
 namespace sinew::lattice::detail {
 namespace {
@@ -35,14 +37,16 @@ struct FloatingSkin {
   double count = 0.0;
 };
 
-std::vector<FloatingSkin> skin_of_components(const RigInput& input, const CellLocator& locator,
-                                             const std::vector<int>& component_of,
+std::vector<FloatingSkin> skin_of_components(const RigInput& input, const ControlLattice& lattice,
+                                             const CellLocator& locator, const std::vector<int>& component_of,
                                              std::size_t num_components) {
+  const LimbCopies copies(lattice);
   std::vector<FloatingSkin> parts(num_components);
   for (FloatingSkin& part : parts) part.weight.assign(input.joints.parents.size(), 0.0);
   for (std::size_t v = 0; v < input.skin.weights.size(); ++v) {
     const Vector3d p = input.skin.points.row(static_cast<Eigen::Index>(v)).transpose();
-    const int cell = locator.find(p, kInsideSlack);
+    int cell = locator.find(p, kInsideSlack);
+    if (cell >= 0) cell = copies.own_copy(cell, skin_frame(input.skin.weights[v], lattice.frame_of_joint), p);
     if (cell < 0 || component_of[cell] < 0) continue;
     FloatingSkin& part = parts[component_of[cell]];
     for (const Influence& influence : input.skin.weights[v])
@@ -53,15 +57,23 @@ std::vector<FloatingSkin> skin_of_components(const RigInput& input, const CellLo
   return parts;
 }
 
-/// Ties every component without a bone to the joint that moves most of its skin.
-void tie_floating_components(const RigInput& input, ControlLattice& lattice) {
+std::vector<int> frames_of(const ControlLattice& lattice) {
+  std::vector<int> frames;
+  for (const LatticeBone& bone : lattice.bones) frames.push_back(bone.frame);
+  for (const SoftFrame& frame : lattice.soft_frames) frames.push_back(frame.frame);
+  return frames;
+}
+
+/// Ties every component without a bone to the joint that moves most of its skin; whether there was one.
+bool tie_floating_components(const RigInput& input, ControlLattice& lattice) {
   const std::vector<std::vector<int>> floating = floating_components(lattice);
-  if (floating.empty()) return;
+  if (floating.empty()) return false;
   std::vector<int> component_of(lattice.complex.cells.size(), -1);
   for (std::size_t i = 0; i < floating.size(); ++i)
     for (int c : floating[i]) component_of[c] = static_cast<int>(i);
   const CellLocator locator(lattice.complex);
-  const std::vector<FloatingSkin> parts = skin_of_components(input, locator, component_of, floating.size());
+  const std::vector<FloatingSkin> parts =
+      skin_of_components(input, lattice, locator, component_of, floating.size());
   for (std::size_t i = 0; i < floating.size(); ++i) {
     const auto heaviest = std::max_element(parts[i].weight.begin(), parts[i].weight.end());
     if (!(*heaviest > 0.0)) continue;  // the gate reports it
@@ -77,6 +89,7 @@ void tie_floating_components(const RigInput& input, ControlLattice& lattice) {
         {input.joints.names[frame.frame], "soft frame",
          fmt::format("holds a separate part of {} cells that no bone reaches", floating[i].size())});
   }
+  return true;
 }
 
 }  // namespace
@@ -117,11 +130,18 @@ void hang_joints(const RigInput& input, const ReducedSkeleton& skeleton, Control
                  FloatingParts floating) {
   lattice.soft_frames = skeleton.soft_frames;
   for (SoftFrame& frame : lattice.soft_frames) frame.position = input.unit_skin.to_rest(frame.position);
-  if (floating == FloatingParts::Tie) tie_floating_components(input, lattice);
-  std::vector<int> frames;
-  for (const LatticeBone& bone : lattice.bones) frames.push_back(bone.frame);
-  for (const SoftFrame& frame : lattice.soft_frames) frames.push_back(frame.frame);
-  lattice.frame_of_joint = frame_of_joint(input.joints.parents, frames);
+  lattice.frame_of_joint = frame_of_joint(input.joints.parents, frames_of(lattice));
+  if (floating == FloatingParts::Leave || !tie_floating_components(input, lattice)) return;
+  const std::vector<int> before = lattice.frame_of_joint;
+  lattice.frame_of_joint = frame_of_joint(input.joints.parents, frames_of(lattice));
+  // A copy keeps the skin that counts for a new frame now.
+  for (CellCopy& copy : lattice.copies) {
+    std::set<int> frames(copy.frames.begin(), copy.frames.end());
+    for (std::size_t j = 0; j < before.size(); ++j)
+      if (std::binary_search(copy.frames.begin(), copy.frames.end(), before[j]))
+        frames.insert(lattice.frame_of_joint[j]);
+    copy.frames.assign(frames.begin(), frames.end());
+  }
 }
 
 }  // namespace sinew::lattice::detail

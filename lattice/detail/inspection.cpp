@@ -11,6 +11,7 @@
 #include "lattice/detail/cell_locator.h"
 #include "lattice/detail/segments.h"
 #include "lattice/detail/triangle_grid.h"
+#include "lattice/limb_copies.h"
 #include "lattice/quality.h"
 
 namespace sinew::lattice::detail {
@@ -25,20 +26,95 @@ constexpr double kInsideSlack = 1e-9;
 constexpr double kChainTolerance = 1e-12;
 constexpr int kVoxelsAcross = 32;  ///< for the skin's volume.
 
-/// Triangles that cross a boundary face of the lattice, though all their vertices are inside.
+/// The boundary of a complex in triangles, quadrilaterals split about their mean, with the cell behind each.
+struct Boundary {
+  std::vector<TriangleCorners> triangles;
+  std::vector<int> cells;
+};
+
+/// Faces that one cell alone has.
+Boundary boundary_of(const CellComplex& complex) {
+  struct Face {
+    std::array<int, 4> key, vertices;
+    int cell;
+  };
+  std::vector<Face> faces;
+  for (int c = 0; c < static_cast<int>(complex.cells.size()); ++c)
+    for (const std::array<int, 4>& corners : cell_faces(complex.cells[c].type)) {
+      Face face;
+      for (int k = 0; k < 4; ++k)
+        face.vertices[k] = corners[k] < 0 ? -1 : complex.cells[c].vertices[corners[k]];
+      face.key = face.vertices;
+      std::sort(face.key.begin(), face.key.end());
+      face.cell = c;
+      faces.push_back(face);
+    }
+  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.key < b.key; });
+  Boundary boundary;
+  const auto point = [&](int v) -> Vector3d { return complex.points.row(v).transpose(); };
+  const auto add = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c, int cell) {
+    boundary.triangles.push_back({a, b, c});
+    boundary.cells.push_back(cell);
+  };
+  for (std::size_t i = 0; i < faces.size();) {
+    std::size_t j = i + 1;
+    while (j < faces.size() && faces[j].key == faces[i].key) ++j;
+    if (j == i + 1) {
+      const std::array<int, 4>& v = faces[i].vertices;
+      if (v[3] < 0) {
+        add(point(v[0]), point(v[1]), point(v[2]), faces[i].cell);
+      } else {
+        const Vector3d centre = 0.25 * (point(v[0]) + point(v[1]) + point(v[2]) + point(v[3]));
+        for (int k = 0; k < 4; ++k) add(point(v[k]), point(v[(k + 1) % 4]), centre, faces[i].cell);
+      }
+    }
+    i = j;
+  }
+  return boundary;
+}
+
+/// The skin as the gate sees it: which frame every vertex follows, and which cells are its own.
+class SkinInCells {
+ public:
+  SkinInCells(const ControlLattice& lattice, const Surface& skin)
+      : skin_(skin), locator_(lattice.complex), copies_(lattice), frame_(skin.points.rows(), -1) {
+    if (lattice.frame_of_joint.empty()) return;
+    for (std::size_t v = 0; v < skin.weights.size(); ++v)
+      frame_[v] = skin_frame(skin.weights[v], lattice.frame_of_joint);
+  }
+  Vector3d point(int vertex) const { return skin_.points.row(vertex).transpose(); }
+  bool owns(int cell, int vertex) const { return copies_.owns(cell, frame_[vertex], point(vertex)); }
+  bool is_inside(int vertex) {
+    locator_.find_all(point(vertex), kInsideSlack, cells_);
+    return std::any_of(cells_.begin(), cells_.end(), [&](int c) { return owns(c, vertex); });
+  }
+
+ private:
+  const Surface& skin_;
+  CellLocator locator_;
+  LimbCopies copies_;
+  std::vector<int> frame_;
+  std::vector<int> cells_;
+};
+
+/// Triangles that cross a boundary face of the lattice, though all their vertices are inside. The faces of a
+/// copy concern its own limb only.
 std::vector<int> find_triangles_outside(const CellComplex& complex, const Surface& skin,
-                                        const std::vector<bool>& vertex_outside, double size) {
+                                        const SkinInCells& places, const std::vector<bool>& vertex_outside,
+                                        double size) {
   const double side = size / std::cbrt(static_cast<double>(complex.cells.size()));
-  const TriangleGrid boundary(boundary_triangles(complex), side);
+  const Boundary boundary = boundary_of(complex);
+  const TriangleGrid grid(boundary.triangles, side);
   std::vector<int> outside;
   for (int t = 0; t < skin.triangles.rows(); ++t) {
-    TriangleCorners corners;
-    bool vertices_inside = true;
-    for (int k = 0; k < 3; ++k) {
-      corners[k] = skin.points.row(skin.triangles(t, k)).transpose();
-      vertices_inside = vertices_inside && !vertex_outside[skin.triangles(t, k)];
-    }
-    if (vertices_inside && boundary.crosses(corners, kInsideSlack * size)) outside.push_back(t);
+    const std::array<int, 3> v{skin.triangles(t, 0), skin.triangles(t, 1), skin.triangles(t, 2)};
+    if (vertex_outside[v[0]] || vertex_outside[v[1]] || vertex_outside[v[2]]) continue;
+    const auto concerns_others = [&](int face) {
+      return std::none_of(v.begin(), v.end(),
+                          [&](int corner) { return places.owns(boundary.cells[face], corner); });
+    };
+    const TriangleCorners corners{places.point(v[0]), places.point(v[1]), places.point(v[2])};
+    if (!grid.for_each_crossing(corners, kInsideSlack * size, concerns_others)) outside.push_back(t);
   }
   return outside;
 }
@@ -84,7 +160,10 @@ void find_broken_chains(const ControlLattice& lattice, double size, Inspection& 
   out.quality.exact_chains = out.broken_chains.empty();
 }
 
-void measure_cells(const CellComplex& complex, Inspection& out) {
+void measure_cells(const ControlLattice& lattice, Inspection& out) {
+  const CellComplex& complex = lattice.complex;
+  std::vector<bool> is_double(complex.cells.size(), false);  // its place is counted already
+  for (const CellCopy& copy : lattice.copies) is_double[copy.cell] = copy.cell != copy.place;
   LatticeQuality& q = out.quality;
   q.min_dihedral_degrees = 180.0;
   q.min_scaled_jacobian = 1.0;
@@ -97,43 +176,14 @@ void measure_cells(const CellComplex& complex, Inspection& out) {
     if (dihedral < q.min_dihedral_degrees) q.min_dihedral_degrees = dihedral, out.flattest_cell = c;
     if (jacobian < q.min_scaled_jacobian) q.min_scaled_jacobian = jacobian, out.most_skewed_cell = c;
     q.min_volume = std::min(q.min_volume, volume);
-    q.volume_ratio += volume;
+    if (!is_double[c]) q.volume_ratio += volume;
   }
 }
 
 }  // namespace
 
 std::vector<TriangleCorners> boundary_triangles(const CellComplex& complex) {
-  struct Face {
-    std::array<int, 4> key, vertices;
-  };
-  std::vector<Face> faces;
-  for (const Cell& cell : complex.cells)
-    for (const std::array<int, 4>& corners : cell_faces(cell.type)) {
-      Face face;
-      for (int k = 0; k < 4; ++k) face.vertices[k] = corners[k] < 0 ? -1 : cell.vertices[corners[k]];
-      face.key = face.vertices;
-      std::sort(face.key.begin(), face.key.end());
-      faces.push_back(face);
-    }
-  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.key < b.key; });
-  std::vector<TriangleCorners> triangles;
-  const auto point = [&](int v) -> Vector3d { return complex.points.row(v).transpose(); };
-  for (std::size_t i = 0; i < faces.size();) {
-    std::size_t j = i + 1;
-    while (j < faces.size() && faces[j].key == faces[i].key) ++j;
-    if (j == i + 1) {
-      const std::array<int, 4>& v = faces[i].vertices;
-      if (v[3] < 0) {
-        triangles.push_back({point(v[0]), point(v[1]), point(v[2])});
-      } else {
-        const Vector3d centre = 0.25 * (point(v[0]) + point(v[1]) + point(v[2]) + point(v[3]));
-        for (int k = 0; k < 4; ++k) triangles.push_back({point(v[k]), point(v[(k + 1) % 4]), centre});
-      }
-    }
-    i = j;
-  }
-  return triangles;
+  return boundary_of(complex).triangles;
 }
 
 std::vector<std::vector<int>> components(const CellComplex& complex) {
@@ -163,18 +213,20 @@ std::vector<std::vector<int>> components(const CellComplex& complex) {
 
 std::vector<std::vector<int>> floating_components(const ControlLattice& lattice) {
   const CellLocator locator(lattice.complex);
+  const LimbCopies copies(lattice);
   std::vector<bool> vertex_held(lattice.complex.points.rows(), false);
   std::vector<bool> cell_held(lattice.complex.cells.size(), false);
-  const auto hold = [&](const Vector3d& p) {
+  const auto hold = [&](int frame, const Vector3d& p) {
     const int cell = locator.find(p, kInsideSlack);
-    if (cell >= 0) cell_held[cell] = true;
+    if (cell >= 0) cell_held[copies.own_copy(cell, frame, p)] = true;
   };
   for (const LatticeBone& bone : lattice.bones) {
     for (int v : bone.chain) vertex_held[v] = true;
     if (!bone.soft) continue;
-    for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) hold((1.0 - s) * bone.rest_start + s * bone.rest_end);
+    for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0})
+      hold(bone.frame, (1.0 - s) * bone.rest_start + s * bone.rest_end);
   }
-  for (const SoftFrame& frame : lattice.soft_frames) hold(frame.position);
+  for (const SoftFrame& frame : lattice.soft_frames) hold(frame.frame, frame.position);
 
   std::vector<std::vector<int>> floating;
   for (const std::vector<int>& part : components(lattice.complex)) {
@@ -194,20 +246,20 @@ Inspection inspect(const ControlLattice& lattice, const Surface& skin, const Uni
   if (complex.cells.empty()) throw std::invalid_argument("lattice: there is no cell");
   const double size = (complex.points.colwise().maxCoeff() - complex.points.colwise().minCoeff()).maxCoeff();
   Inspection out;
-  measure_cells(complex, out);
+  measure_cells(lattice, out);
   const double volume = skin_volume(unit);
   out.quality.volume_ratio =
       volume > 0.0 ? out.quality.volume_ratio / volume : std::numeric_limits<double>::infinity();
 
-  const CellLocator locator(complex);
+  SkinInCells places(lattice, skin);
   std::vector<bool> vertex_outside(skin.points.rows(), false);
   for (int v = 0; v < skin.points.rows(); ++v) {
-    if (locator.find(skin.points.row(v).transpose(), kInsideSlack) >= 0) continue;
+    if (places.is_inside(v)) continue;
     vertex_outside[v] = true;
     out.vertices_outside.push_back(v);
   }
   out.quality.skin_vertices_outside = static_cast<int>(out.vertices_outside.size());
-  out.triangles_outside = find_triangles_outside(complex, skin, vertex_outside, size);
+  out.triangles_outside = find_triangles_outside(complex, skin, places, vertex_outside, size);
   out.quality.skin_triangles_outside = static_cast<int>(out.triangles_outside.size());
   find_broken_chains(lattice, size, out);
   out.floating = floating_components(lattice);

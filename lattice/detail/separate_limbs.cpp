@@ -1,183 +1,142 @@
 #include "lattice/detail/separate_limbs.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <map>
 #include <numeric>
+#include <set>
 
-#include "lattice/detail/cell_locator.h"
-#include "lattice/detail/segments.h"
-#include "lattice/detail/skeleton_distance.h"
-#include "lattice/detail/triangle_grid.h"
+#include "lattice/detail/limb_map.h"
 
 namespace sinew::lattice::detail {
 namespace {
 
 using Eigen::Vector3d;
 
-/// Skin farther apart than this along the skeleton belongs to different parts, in units of h.
-constexpr double kPartDistance = 1.5;
-constexpr double kSampleSpacing = 0.25;  ///< of skin samples, in units of h.
-constexpr double kInsideSlack = 1e-9;
-
-/// Which stretches of which bones move the skin in a cell.
-using Label = std::vector<BoneStretch>;
-
+/// Every limb in every cell is one instance: a cell to be. A cell of which nothing is known has one without
+/// pieces.
 class Separation {
  public:
   Separation(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice)
       : input_(input),
-        skeleton_(skeleton),
         lattice_(lattice),
-        distance_(skeleton),
-        h_(lattice.edge_length / input.unit_skin.scale),
-        labels_(lattice.complex.cells.size()) {}
+        faces_(faces_of(lattice.complex)),
+        limbs_(input, skeleton, lattice, faces_),
+        is_touched_(lattice.complex.points.rows(), false) {}
 
-  int run() {
-    if (skeleton_.bones.empty()) return 0;
-    label_cells();
-    find_gaps();
-    return gaps_.empty() ? 0 : split_vertices();
+  void run() {
+    number_instances();
+    for (const CellFace& face : faces_) link_of_face_.push_back(link(face));
+    split_vertices();
+    rebuild();
   }
 
  private:
-  void label_cells();
-  void add_sample(int cell, int bone, const Vector3d& p);
-  int dominant_bone(const std::vector<Influence>& influences, const Vector3d& p) const;
-  bool are_apart(int a, int b) const;
-  bool is_outside(const TriangleCorners& face) const;
-  void find_gaps();
-  int split_vertices();
-  std::vector<std::vector<int>> parts_at(const std::vector<int>& star, int vertex) const;
+  struct Instance {
+    int cell;
+    Limb limb;
+    std::array<int, 8> vertices;
+  };
+  /// Pairs of instances that go on into each other through a face.
+  using Links = std::vector<std::array<int, 2>>;
+  static constexpr int kSimple = -1;  ///< link of a face that its cells just share.
+
+  void number_instances();
+  int link(const CellFace& face);
+  bool is_single(int cell) const { return first_[cell + 1] - first_[cell] == 1; }
+  std::vector<Vector3d> flesh_on(const CellFace& face) const;
+  int owner(int cell, const Limb& flesh) const;
+  std::vector<std::vector<int>> parts_at(const std::vector<int>& star, const std::vector<int>& faces) const;
+  bool is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones) const;
+  void split_vertices();
+  void rebuild();
 
   const RigInput& input_;
-  const ReducedSkeleton& skeleton_;
   ControlLattice& lattice_;
-  SkeletonDistance distance_;
-  double h_;
-  std::vector<Label> labels_;
-  std::vector<std::vector<int>> bones_of_joint_;  ///< those that a joint's weight counts for.
-  /// Per face, by its sorted vertices: the cells on it.
-  std::map<std::array<int, 3>, std::vector<int>> faces_;
-  std::map<std::array<int, 3>, bool> gaps_;  ///< faces to be cut.
+  std::vector<CellFace> faces_;
+  LimbMap limbs_;
+  std::vector<Instance> instances_;  ///< by cell.
+  std::vector<int> first_;           ///< first instance of every cell, and the end.
+  std::vector<int> link_of_face_;    ///< index into links_ or kSimple.
+  std::vector<Links> links_;
+  std::vector<bool> is_touched_;  ///< vertices that may have to be split.
 };
 
-std::array<int, 3> sorted(int a, int b, int c) {
-  std::array<int, 3> key{a, b, c};
-  std::sort(key.begin(), key.end());
-  return key;
+void Separation::number_instances() {
+  const std::vector<Cell>& cells = lattice_.complex.cells;
+  for (int c = 0; c < static_cast<int>(cells.size()); ++c) {
+    first_.push_back(static_cast<int>(instances_.size()));
+    const std::vector<Limb>& limbs = limbs_.limbs(c);
+    for (const Limb& limb : limbs) instances_.push_back({c, limb, cells[c].vertices});
+    if (limbs.empty()) instances_.push_back({c, {}, cells[c].vertices});
+    if (limbs.size() < 2) continue;
+    for (int k = 0; k < num_corners(cells[c].type); ++k) is_touched_[cells[c].vertices[k]] = true;
+  }
+  first_.push_back(static_cast<int>(instances_.size()));
 }
 
-/// The bone of the joint with most weight; of several the nearest.
-int Separation::dominant_bone(const std::vector<Influence>& influences, const Vector3d& p) const {
-  std::map<int, double> weight;  // by first bone: joints that count for the same frame share their bones
-  for (const Influence& influence : influences)
-    if (!bones_of_joint_[influence.frame].empty())
-      weight[bones_of_joint_[influence.frame][0]] += influence.weight;
-  if (weight.empty()) return -1;
-  const int first = std::max_element(weight.begin(), weight.end(), [](const auto& a, const auto& b) {
-                      return a.second < b.second;
-                    })->first;
-  int nearest = -1;
+/// Points of a face that lie inside the skin: of its mean, corners (drawn in a little), edge midpoints and
+/// half-way to the corners.
+std::vector<Vector3d> Separation::flesh_on(const CellFace& face) const {
+  const int n = face.vertices[3] < 0 ? 3 : 4;
+  std::array<Vector3d, 4> corners;
+  Vector3d mean = Vector3d::Zero();
+  for (int k = 0; k < n; ++k) {
+    corners[k] = input_.unit_skin.to_unit(lattice_.complex.points.row(face.vertices[k]).transpose());
+    mean += corners[k] / n;
+  }
+  std::vector<Vector3d> points{mean};
+  for (int k = 0; k < n; ++k) {
+    points.push_back(0.9 * corners[k] + 0.1 * mean);
+    points.push_back(0.5 * corners[k] + 0.5 * mean);
+    points.push_back(0.45 * (corners[k] + corners[(k + 1) % n]) + 0.1 * mean);
+  }
+  std::erase_if(points, [&](const Vector3d& p) { return !input_.unit_skin.is_inside(p); });
+  return points;
+}
+
+/// The instance of a cell that flesh belongs to: the nearest along the skeleton.
+int Separation::owner(int cell, const Limb& flesh) const {
+  int nearest = first_[cell];
   double best = std::numeric_limits<double>::infinity();
-  for (int b = 0; b < static_cast<int>(skeleton_.bones.size()); ++b) {
-    const ReducedBone& bone = skeleton_.bones[b];
-    if (bone.frame != skeleton_.bones[first].frame) continue;
-    const double d =
-        point_segment_distance(p, skeleton_.nodes[bone.start].position, skeleton_.nodes[bone.end].position);
-    if (d < best) best = d, nearest = b;
+  for (int i = first_[cell]; i < first_[cell + 1]; ++i) {
+    const double distance = limbs_.distance(instances_[i].limb, flesh);
+    if (distance < best) best = distance, nearest = i;
   }
   return nearest;
 }
 
-void Separation::add_sample(int cell, int bone, const Vector3d& p) {
-  const Vector3d a = skeleton_.nodes[skeleton_.bones[bone].start].position;
-  const Vector3d b = skeleton_.nodes[skeleton_.bones[bone].end].position;
-  const double s = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
-  for (BoneStretch& stretch : labels_[cell])
-    if (stretch.bone == bone) {
-      stretch.low = std::min(stretch.low, s);
-      stretch.high = std::max(stretch.high, s);
-      return;
+/// Cells share a face where both are of one limb, or flesh passes through it; copies where they are of the
+/// same limb, or own the same flesh on the face.
+int Separation::link(const CellFace& face) {
+  if (face.second < 0) return kSimple;
+  const bool are_single = is_single(face.first) && is_single(face.second);
+  if (are_single) {
+    const Limb &a = instances_[first_[face.first]].limb, &b = instances_[first_[face.second]].limb;
+    if (a.empty() || b.empty() || limbs_.are_together(a, b) || !flesh_on(face).empty()) return kSimple;
+  }
+  std::set<std::array<int, 2>> links;
+  if (!are_single) {
+    for (int i = first_[face.first]; i < first_[face.first + 1]; ++i)
+      for (int k = first_[face.second]; k < first_[face.second + 1]; ++k)
+        if (limbs_.are_together(instances_[i].limb, instances_[k].limb)) links.insert({i, k});
+    for (const Vector3d& p : flesh_on(face)) {
+      const Limb flesh = limbs_.flesh_at(p);
+      links.insert({owner(face.first, flesh), owner(face.second, flesh)});
     }
-  labels_[cell].push_back({bone, s, s});
-}
-
-void Separation::label_cells() {
-  std::vector<int> frames;
-  for (const ReducedBone& bone : skeleton_.bones) frames.push_back(bone.frame);
-  const std::vector<int> frame = frame_of_joint(input_.joints.parents, frames);
-  bones_of_joint_.resize(frame.size());
-  for (std::size_t j = 0; j < frame.size(); ++j)
-    for (int b = 0; b < static_cast<int>(skeleton_.bones.size()); ++b)
-      if (skeleton_.bones[b].frame == frame[j]) bones_of_joint_[j].push_back(b);
-
-  const UnitSkin& skin = input_.unit_skin;
-  const CellLocator locator(lattice_.complex);
-  for (int t = 0; t < skin.triangles.rows(); ++t) {
-    const Vector3d a = skin.points.row(skin.triangles(t, 0)), b = skin.points.row(skin.triangles(t, 1)),
-                   c = skin.points.row(skin.triangles(t, 2));
-    const int n = std::max(1, static_cast<int>(std::ceil((b - a).norm() / (kSampleSpacing * h_))));
-    const int m = std::max(1, static_cast<int>(std::ceil((c - a).norm() / (kSampleSpacing * h_))));
-    for (int i = 0; i <= n; ++i)
-      for (int k = 0; k <= m; ++k) {
-        const double u = static_cast<double>(i) / n, v = static_cast<double>(k) / m;
-        if (u + v > 1.0 + 1e-12) continue;
-        const Vector3d p = a + u * (b - a) + v * (c - a);
-        const int cell = locator.find(skin.to_rest(p), kInsideSlack);
-        // The weights of the nearest corner decide.
-        const int corner = u > 0.5 ? 1 : v > 0.5 ? 2 : 0;
-        const int bone = dominant_bone(skin.weights[skin.triangles(t, corner)], p);
-        if (cell >= 0 && bone >= 0) add_sample(cell, bone, p);
-      }
   }
+  for (int v : face.vertices)
+    if (v >= 0) is_touched_[v] = true;
+  links_.emplace_back(links.begin(), links.end());
+  return static_cast<int>(links_.size()) - 1;
 }
 
-bool Separation::are_apart(int a, int b) const {
-  if (labels_[a].empty() || labels_[b].empty()) return false;
-  for (const BoneStretch& x : labels_[a])
-    for (const BoneStretch& y : labels_[b])
-      if (distance_.between(x, y) < kPartDistance * h_) return false;
-  return true;
-}
-
-/// True where the corners (drawn in a little), edge midpoints and mean of a face lie outside the skin.
-bool Separation::is_outside(const TriangleCorners& face) const {
-  const Vector3d mean = (face[0] + face[1] + face[2]) / 3.0;
-  if (input_.unit_skin.is_inside(mean)) return false;
-  for (int k = 0; k < 3; ++k) {
-    if (input_.unit_skin.is_inside(0.9 * face[k] + 0.1 * mean)) return false;
-    if (input_.unit_skin.is_inside(0.45 * (face[k] + face[(k + 1) % 3]) + 0.1 * mean)) return false;
-  }
-  return true;
-}
-
-void Separation::find_gaps() {
-  const CellComplex& complex = lattice_.complex;
-  for (int c = 0; c < static_cast<int>(complex.cells.size()); ++c)
-    for (const std::array<int, 4>& f : cell_faces(complex.cells[c].type)) {
-      const auto& v = complex.cells[c].vertices;
-      faces_[sorted(v[f[0]], v[f[1]], v[f[2]])].push_back(c);
-    }
-  const UnitSkin& skin = input_.unit_skin;
-  std::vector<TriangleCorners> triangles;
-  for (int t = 0; t < skin.triangles.rows(); ++t)
-    triangles.push_back({skin.points.row(skin.triangles(t, 0)), skin.points.row(skin.triangles(t, 1)),
-                         skin.points.row(skin.triangles(t, 2))});
-  const TriangleGrid grid(std::move(triangles), 0.5 * h_);
-  for (const auto& [key, cells] : faces_) {
-    if (cells.size() != 2 || !are_apart(cells[0], cells[1])) continue;
-    TriangleCorners face;
-    for (int k = 0; k < 3; ++k) face[k] = skin.to_unit(complex.points.row(key[k]).transpose());
-    if (is_outside(face) && !grid.crosses(face, 0.0)) gaps_[key] = true;
-  }
-}
-
-/// The cells round a vertex in groups that hang together through faces that are not cut, or hold skin of one
-/// part.
-std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star, int vertex) const {
-  std::vector<int> group(star.size());
+/// The instances round a vertex in groups that hang together through faces or belong to one limb.
+std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
+                                                   const std::vector<int>& faces) const {
+  std::vector<int> members;
+  for (int c : star)
+    for (int i = first_[c]; i < first_[c + 1]; ++i) members.push_back(i);
+  std::vector<int> group(members.size());
   std::iota(group.begin(), group.end(), 0);
   const auto root = [&](int i) {
     while (group[i] != i) i = group[i] = group[group[i]];
@@ -187,65 +146,119 @@ std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
     const int a = root(i), b = root(k);
     group[std::max(a, b)] = std::min(a, b);
   };
-  for (std::size_t i = 0; i < star.size(); ++i)
-    for (const std::array<int, 4>& f : cell_faces(CellType::Tetrahedron)) {
-      const auto& v = lattice_.complex.cells[star[i]].vertices;
-      const std::array<int, 3> key = sorted(v[f[0]], v[f[1]], v[f[2]]);
-      if (std::find(key.begin(), key.end(), vertex) == key.end() || gaps_.contains(key)) continue;
-      for (int other : faces_.at(key)) {
-        const auto k = std::find(star.begin(), star.end(), other) - star.begin();
-        join(static_cast<int>(i), static_cast<int>(k));
-      }
+  const auto place = [&](int instance) {
+    return static_cast<int>(std::lower_bound(members.begin(), members.end(), instance) - members.begin());
+  };
+  for (int f : faces) {
+    const CellFace& face = faces_[f];
+    if (face.second < 0) continue;
+    if (link_of_face_[f] == kSimple) {
+      join(place(first_[face.first]), place(first_[face.second]));
+      continue;
     }
-  for (std::size_t i = 0; i < star.size(); ++i)
-    for (std::size_t k = i + 1; k < star.size(); ++k)
-      if (!labels_[star[i]].empty() && !labels_[star[k]].empty() && !are_apart(star[i], star[k]))
-        join(static_cast<int>(i), static_cast<int>(k));
+    for (const auto& [i, k] : links_[link_of_face_[f]]) join(place(i), place(k));
+  }
+  const int n = static_cast<int>(members.size());
+  for (int i = 0; i < n; ++i)
+    for (int k = i + 1; k < n; ++k)
+      if (root(i) != root(k) && limbs_.are_together(instances_[members[i]].limb, instances_[members[k]].limb))
+        join(i, k);
   std::vector<std::vector<int>> parts;
-  std::map<int, std::size_t> part_of;
-  for (std::size_t i = 0; i < star.size(); ++i) {
-    const auto [entry, fresh] = part_of.emplace(root(static_cast<int>(i)), parts.size());
-    if (fresh) parts.emplace_back();
-    parts[entry->second].push_back(star[i]);
+  std::vector<int> part_of(members.size(), -1);
+  for (int i = 0; i < n; ++i) {
+    int& part = part_of[root(i)];
+    if (part < 0) {
+      part = static_cast<int>(parts.size());
+      parts.emplace_back();
+    }
+    parts[part].push_back(members[i]);
   }
   return parts;
 }
 
-int Separation::split_vertices() {
-  CellComplex& complex = lattice_.complex;
-  std::vector<bool> on_bone(complex.points.rows(), false), on_gap(complex.points.rows(), false);
-  for (const LatticeBone& bone : lattice_.bones)
-    for (int v : bone.chain) on_bone[v] = true;
-  for (const auto& [key, cut] : gaps_)
-    for (int v : key) on_gap[v] = true;
-  std::vector<std::vector<int>> stars(complex.points.rows());
-  for (int c = 0; c < static_cast<int>(complex.cells.size()); ++c)
-    for (int k = 0; k < 4; ++k) stars[complex.cells[c].vertices[k]].push_back(c);
+bool Separation::is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones) const {
+  return std::any_of(part.begin(), part.end(), [&](int i) {
+    return std::any_of(bones.begin(), bones.end(),
+                       [&](const Limb& bone) { return limbs_.are_together(instances_[i].limb, bone); });
+  });
+}
 
-  std::vector<Cell> cells = complex.cells;  // the old ones serve the questions
-  std::vector<int> original;                // of each copy
+void Separation::split_vertices() {
+  const CellComplex& complex = lattice_.complex;
   const int count = static_cast<int>(complex.points.rows());
+  std::vector<std::vector<int>> stars(count), faces_at(count);
+  for (int c = 0; c < static_cast<int>(complex.cells.size()); ++c)
+    for (int k = 0; k < num_corners(complex.cells[c].type); ++k)
+      if (is_touched_[complex.cells[c].vertices[k]]) stars[complex.cells[c].vertices[k]].push_back(c);
+  for (int f = 0; f < static_cast<int>(faces_.size()); ++f)
+    for (int v : faces_[f].vertices)
+      if (v >= 0 && is_touched_[v]) faces_at[v].push_back(f);
+  std::vector<std::vector<Limb>> bones_at(count);
+  for (int b = 0; b < static_cast<int>(lattice_.bones.size()); ++b)
+    for (int v : lattice_.bones[b].chain)
+      bones_at[v].push_back(limbs_.bone_at(b, input_.unit_skin.to_unit(complex.points.row(v).transpose())));
+
+  std::vector<int> original;  // of each new vertex
   for (int v = 0; v < count; ++v) {
-    if (!on_gap[v] || on_bone[v]) continue;
-    const std::vector<std::vector<int>> parts = parts_at(stars[v], v);
-    for (std::size_t part = 1; part < parts.size(); ++part) {
+    if (!is_touched_[v]) continue;
+    const std::vector<std::vector<int>> parts = parts_at(stars[v], faces_at[v]);
+    // The vertex stays with every part of its bones' limbs; off the bones with the first part.
+    std::vector<bool> stays(parts.size(), false);
+    for (std::size_t p = 0; p < parts.size(); ++p) stays[p] = is_of_bone(parts[p], bones_at[v]);
+    if (std::find(stays.begin(), stays.end(), true) == stays.end()) stays[0] = true;
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      if (stays[p]) continue;
       const int copy = count + static_cast<int>(original.size());
       original.push_back(v);
-      for (int c : parts[part])
-        std::replace(cells[c].vertices.begin(), cells[c].vertices.begin() + 4, v, copy);
+      for (int i : parts[p])
+        std::replace(instances_[i].vertices.begin(), instances_[i].vertices.end(), v, copy);
     }
   }
-  complex.cells = std::move(cells);
-  complex.points.conservativeResize(count + static_cast<Eigen::Index>(original.size()), 3);
+  Points& points = lattice_.complex.points;
+  points.conservativeResize(count + static_cast<Eigen::Index>(original.size()), 3);
   for (std::size_t i = 0; i < original.size(); ++i)
-    complex.points.row(count + static_cast<Eigen::Index>(i)) = complex.points.row(original[i]).eval();
-  return static_cast<int>(original.size());
+    points.row(count + static_cast<Eigen::Index>(i)) = points.row(original[i]).eval();
+}
+
+/// Instances with all their vertices in common are one cell after all.
+void Separation::rebuild() {
+  std::vector<Cell>& cells = lattice_.complex.cells;
+  std::vector<CellCopy> copies;
+  std::vector<Cell> more;
+  const int count = static_cast<int>(cells.size());
+  for (int c = 0; c < count; ++c) {
+    std::vector<std::array<int, 8>> distinct;
+    std::vector<std::set<int>> frames;
+    for (int i = first_[c]; i < first_[c + 1]; ++i) {
+      const auto same = std::find(distinct.begin(), distinct.end(), instances_[i].vertices);
+      const auto at = static_cast<std::size_t>(same - distinct.begin());
+      if (same == distinct.end()) {
+        distinct.push_back(instances_[i].vertices);
+        frames.emplace_back();
+      }
+      for (const LimbPiece& piece : instances_[i].limb) frames[at].insert(piece.frame);
+    }
+    for (std::size_t k = 0; k < distinct.size(); ++k) {
+      const int cell = k == 0 ? c : count + static_cast<int>(more.size());
+      if (k == 0) {
+        cells[c].vertices = distinct[0];
+      } else {
+        more.push_back({cells[c].type, distinct[k]});
+      }
+      if (distinct.size() > 1) copies.push_back({cell, c, {frames[k].begin(), frames[k].end()}});
+    }
+  }
+  cells.insert(cells.end(), more.begin(), more.end());
+  std::sort(copies.begin(), copies.end(),
+            [](const CellCopy& a, const CellCopy& b) { return a.cell < b.cell; });
+  lattice_.copies = std::move(copies);
 }
 
 }  // namespace
 
-int separate_limbs(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice) {
-  return Separation(input, skeleton, lattice).run();
+void separate_limbs(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice) {
+  if (skeleton.bones.empty() || lattice.complex.cells.empty()) return;
+  Separation(input, skeleton, lattice).run();
 }
 
 }  // namespace sinew::lattice::detail

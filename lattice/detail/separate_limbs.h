@@ -5,12 +5,15 @@
 
 namespace sinew::lattice::detail {
 
-/// Unglues parts of the body that only meet across a gap, legs side by side or an arm along the flank: where
-/// two cells meet in a face that lies wholly outside the skin, and the skin in them is farther apart along
-/// the skeleton than 1.5 h, they no longer share its vertices. Every part keeps its cells and gets copies of
-/// the vertices, at the same place. Cells that hold the skin of both parts stay (full separation would double
-/// them), and so do vertices of bones. Needs cells, bones and edge length of `lattice`. Returns the number of
-/// copies.
-int separate_limbs(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice);
+/// Gives limbs that lie side by side, two legs, fingers, a tail along the thigh, cells of their own. Where
+/// the skin and bones in a cell are of several limbs (LimbMap), every limb gets a copy of the cell; cells and
+/// copies share vertices round a vertex only with those of the same limb, or into which their flesh goes on
+/// through a face. Two cells of different limbs that meet across a gap part as well. A bone keeps its
+/// vertices in the copies of its own limb, the others get vertices at the same places.
+///
+/// Copies beyond the first of a place come after all other cells; `lattice.copies` lists them. A face may
+/// then belong to more than two cells. Needs cells, bones and edge length of `lattice`; its first vertices
+/// and cells keep their numbers.
+void separate_limbs(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice);
 
 }  // namespace sinew::lattice::detail

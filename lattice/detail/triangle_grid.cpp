@@ -79,6 +79,11 @@ Eigen::Vector3i TriangleGrid::cell_of(const Vector3d& p) const {
 }
 
 bool TriangleGrid::crosses(const TriangleCorners& t, double eps) const {
+  return !for_each_crossing(t, eps, [](int) { return false; });
+}
+
+bool TriangleGrid::for_each_crossing(const TriangleCorners& t, double eps,
+                                     const std::function<bool(int)>& visit) const {
   ++question_;
   const Box box = box_of(t);
   const Eigen::Vector3i first = cell_of(box.low), last = cell_of(box.high);
@@ -91,9 +96,9 @@ bool TriangleGrid::crosses(const TriangleCorners& t, double eps) const {
           const Box other = box_of(triangles_[n]);
           if ((other.low.array() > box.high.array()).any() || (other.high.array() < box.low.array()).any())
             continue;
-          if (triangles_cross(t, triangles_[n], eps)) return true;
+          if (triangles_cross(t, triangles_[n], eps) && !visit(n)) return false;
         }
-  return false;
+  return true;
 }
 
 }  // namespace sinew::lattice::detail

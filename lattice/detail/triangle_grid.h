@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -20,6 +21,10 @@ class TriangleGrid {
 
   /// True where some triangle crosses `t`.
   bool crosses(const TriangleCorners& t, double eps) const;
+
+  /// Calls visit(index) for every triangle that crosses `t` until it returns false; whether it always
+  /// returned true.
+  bool for_each_crossing(const TriangleCorners& t, double eps, const std::function<bool(int)>& visit) const;
 
  private:
   Eigen::Vector3i cell_of(const Eigen::Vector3d& p) const;

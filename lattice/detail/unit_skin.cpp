@@ -199,8 +199,15 @@ UnitSkin make_unit_skin(const Surface& skin) {
   }
   for (Vector3d& n : normals) n.stableNormalize();
   SurfaceQuery query(points, triangles);
-  return {centre,           scale,           points, triangles, std::move(weights), std::move(normals),
-          std::move(areas), std::move(query)};
+  return {centre,
+          scale,
+          points,
+          triangles,
+          std::move(weights),
+          std::move(normals),
+          std::move(areas),
+          std::move(new_vertex),
+          std::move(query)};
 }
 
 }  // namespace sinew::lattice::detail

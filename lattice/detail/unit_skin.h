@@ -17,6 +17,7 @@ struct UnitSkin {
   std::vector<std::vector<Influence>> weights;  ///< per welded point.
   std::vector<Eigen::Vector3d> normals;  ///< per welded point, area weighted; zero where no triangle is.
   std::vector<double> areas;             ///< a third of the triangles round each welded point.
+  std::vector<int> welded;               ///< per vertex of the caller's skin: its welded point.
   SurfaceQuery query;
 
   Eigen::Vector3d to_unit(const Eigen::Vector3d& p) const { return (p - centre) / scale; }

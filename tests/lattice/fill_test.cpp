@@ -94,7 +94,7 @@ TEST(SampleTriangles, LeavesNoPointOfATriangleFartherThanTheSpacing) {
   points << 0, 0, 0, 3, 0, 0, 0, 1, 0.5;
   Triangles triangles(1, 3);
   triangles << 0, 1, 2;
-  const Points samples = sample_triangles(points, triangles, 0.1);
+  const Points samples = sample_triangles(points, triangles, 0.1).points;
   for (double a = 0.0; a <= 1.0; a += 0.05) {
     for (double b = 0.0; a + b <= 1.0; b += 0.05) {
       const Eigen::RowVector3d p = (1 - a - b) * points.row(0) + a * points.row(1) + b * points.row(2);

@@ -1,0 +1,293 @@
+#include "lattice/detail/limb_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tuple>
+
+#include "lattice/detail/cell_locator.h"
+#include "lattice/detail/segments.h"
+#include "lattice/detail/triangle_grid.h"
+#include "lattice/limb_copies.h"
+
+namespace sinew::lattice::detail {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Flesh farther apart than this along the skeleton belongs to different limbs, in units of h.
+constexpr double kLimbDistance = 1.5;
+constexpr double kSoftBoneSpacing = 0.25;  ///< of the points along soft bones, in units of h.
+constexpr double kInsideSlack = 1e-9;
+constexpr double kGridSide = 0.5;  ///< of the grid of triangles, in units of h.
+
+bool is_before(const LimbPiece& a, const LimbPiece& b) {
+  return std::tie(a.frame, a.stretch.bone) < std::tie(b.frame, b.stretch.bone);
+}
+
+/// Widens the piece of the same frame and bone, or adds it.
+void merge(std::vector<LimbPiece>& pieces, const LimbPiece& piece) {
+  for (LimbPiece& other : pieces)
+    if (other.frame == piece.frame && other.stretch.bone == piece.stretch.bone) {
+      other.stretch.low = std::min(other.stretch.low, piece.stretch.low);
+      other.stretch.high = std::max(other.stretch.high, piece.stretch.high);
+      return;
+    }
+  pieces.push_back(piece);
+}
+
+/// The skin's triangles with their numbers, for visits by face.
+std::vector<TriangleCorners> corners_of(const UnitSkin& skin) {
+  std::vector<TriangleCorners> triangles;
+  for (int t = 0; t < skin.triangles.rows(); ++t)
+    triangles.push_back({skin.points.row(skin.triangles(t, 0)), skin.points.row(skin.triangles(t, 1)),
+                         skin.points.row(skin.triangles(t, 2))});
+  return triangles;
+}
+
+}  // namespace
+
+std::vector<CellFace> faces_of(const CellComplex& complex) {
+  struct Side {
+    std::array<int, 4> key, vertices;
+    int cell;
+  };
+  std::vector<Side> sides;
+  for (int c = 0; c < static_cast<int>(complex.cells.size()); ++c)
+    for (const std::array<int, 4>& corners : cell_faces(complex.cells[c].type)) {
+      Side side;
+      for (int k = 0; k < 4; ++k)
+        side.vertices[k] = corners[k] < 0 ? -1 : complex.cells[c].vertices[corners[k]];
+      side.key = side.vertices;
+      std::sort(side.key.begin(), side.key.end());
+      side.cell = c;
+      sides.push_back(side);
+    }
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return std::tie(a.key, a.cell) < std::tie(b.key, b.cell); });
+  std::vector<CellFace> faces;
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    if (i > 0 && sides[i].key == sides[i - 1].key) {
+      faces.back().second = sides[i].cell;
+    } else {
+      faces.push_back({sides[i].vertices, sides[i].cell, -1});
+    }
+  }
+  return faces;
+}
+
+LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const ControlLattice& lattice,
+                 const std::vector<CellFace>& faces)
+    : input_(input),
+      skeleton_(skeleton),
+      lattice_(lattice),
+      distance_(skeleton),
+      h_(lattice.edge_length / input.unit_skin.scale) {
+  std::vector<int> frames;
+  for (const ReducedBone& bone : skeleton.bones) frames.push_back(bone.frame);
+  const std::vector<int> bone_frame = detail::frame_of_joint(input.joints.parents, frames);
+  for (const SoftFrame& soft : skeleton.soft_frames) frames.push_back(soft.frame);
+  frame_of_joint_ = detail::frame_of_joint(input.joints.parents, frames);
+  bones_of_.resize(bone_frame.size());
+  for (std::size_t j = 0; j < bone_frame.size(); ++j)
+    for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
+      if (skeleton.bones[b].frame == bone_frame[j]) bones_of_[j].push_back(b);
+  for (const std::vector<Influence>& influences : input.unit_skin.weights)
+    frame_of_vertex_.push_back(skin_frame(influences, frame_of_joint_));
+
+  std::vector<Label> labels(lattice.complex.cells.size());
+  label_skin(labels, faces);
+  label_bones(labels);
+  for (const Label& label : labels) limbs_.push_back(gather(label));
+}
+
+LimbPiece LimbMap::piece_at(int frame, const Vector3d& p) const {
+  LimbPiece piece;
+  piece.frame = frame;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int b : bones_of_[frame]) {
+    const Vector3d start = skeleton_.nodes[skeleton_.bones[b].start].position;
+    const Vector3d end = skeleton_.nodes[skeleton_.bones[b].end].position;
+    const double distance = point_segment_distance(p, start, end);
+    if (!(distance < nearest)) continue;
+    nearest = distance;
+    const double s = std::clamp((p - start).dot(end - start) / (end - start).squaredNorm(), 0.0, 1.0);
+    piece.stretch = {b, s, s};
+  }
+  return piece;
+}
+
+void LimbMap::add(Label& label, int frame, const Vector3d& p) const {
+  if (frame < 0) return;
+  merge(label.pieces, piece_at(frame, p));
+}
+
+/// A triangle of the skin in a cell: its corners must not part, whatever they hang on.
+void LimbMap::add_triangle(Label& label, const std::array<int, 3>& frames, const Vector3d& p) const {
+  for (int k = 0; k < 3; ++k) {
+    if (k > 0 && frames[k] == frames[k - 1]) continue;
+    add(label, frames[k], p);
+    const int other = frames[(k + 1) % 3];
+    if (frames[k] >= 0 && other >= 0 && frames[k] != other) label.joined.push_back({frames[k], other});
+  }
+}
+
+/// A triangle lies in the cells that hold its corners and in those whose faces it crosses: no sampling, and
+/// so no piece of skin is overlooked.
+void LimbMap::label_skin(std::vector<Label>& labels, const std::vector<CellFace>& faces) const {
+  const UnitSkin& skin = input_.unit_skin;
+  const CellLocator locator(lattice_.complex);
+  std::vector<std::vector<int>> cells_of(skin.points.rows());
+  for (int v = 0; v < skin.points.rows(); ++v)
+    locator.find_all(skin.to_rest(skin.points.row(v).transpose()), kInsideSlack, cells_of[v]);
+  // Vertices welded to one may hang on different joints.
+  for (std::size_t v = 0; v < input_.skin.weights.size(); ++v) {
+    const int welded = skin.welded[v];
+    const int frame = skin_frame(input_.skin.weights[v], frame_of_joint_);
+    for (int c : cells_of[welded]) add(labels[c], frame, skin.points.row(welded).transpose());
+  }
+  const auto frames = [&](int t) -> std::array<int, 3> {
+    return {frame_of_vertex_[skin.triangles(t, 0)], frame_of_vertex_[skin.triangles(t, 1)],
+            frame_of_vertex_[skin.triangles(t, 2)]};
+  };
+  for (int t = 0; t < skin.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const int v = skin.triangles(t, k);
+      for (int c : cells_of[v]) add_triangle(labels[c], frames(t), skin.points.row(v).transpose());
+    }
+  const TriangleGrid grid(corners_of(skin), kGridSide * h_);
+  for (const CellFace& face : faces) {
+    const int n = face.vertices[3] < 0 ? 3 : 4;
+    std::array<Vector3d, 4> corners;
+    Vector3d mean = Vector3d::Zero();
+    for (int k = 0; k < n; ++k) {
+      corners[k] = skin.to_unit(lattice_.complex.points.row(face.vertices[k]).transpose());
+      mean += corners[k] / n;
+    }
+    const auto visit = [&](int t) {
+      for (const int cell : {face.first, face.second})
+        if (cell >= 0) add_triangle(labels[cell], frames(t), mean);
+      return true;
+    };
+    if (n == 3) grid.for_each_crossing({corners[0], corners[1], corners[2]}, 0.0, visit);
+    for (int k = 0; n == 4 && k < 4; ++k)
+      grid.for_each_crossing({corners[k], corners[(k + 1) % 4], mean}, 0.0, visit);
+  }
+}
+
+void LimbMap::label_bones(std::vector<Label>& labels) const {
+  struct Edge {
+    int low, high, bone;
+  };
+  std::vector<Edge> edges;
+  for (int b = 0; b < static_cast<int>(lattice_.bones.size()); ++b) {
+    const std::vector<int>& chain = lattice_.bones[b].chain;
+    for (std::size_t i = 1; i < chain.size(); ++i)
+      edges.push_back({std::min(chain[i - 1], chain[i]), std::max(chain[i - 1], chain[i]), b});
+  }
+  const auto before = [](const Edge& a, const Edge& b) {
+    return std::tie(a.low, a.high) < std::tie(b.low, b.high);
+  };
+  std::sort(edges.begin(), edges.end(), before);
+  const UnitSkin& skin = input_.unit_skin;
+  for (std::size_t c = 0; c < labels.size(); ++c) {
+    const Cell& cell = lattice_.complex.cells[c];
+    for (const std::array<int, 2>& e : cell_edges(cell.type)) {
+      const int a = cell.vertices[e[0]], b = cell.vertices[e[1]];
+      const auto found =
+          std::lower_bound(edges.begin(), edges.end(), Edge{std::min(a, b), std::max(a, b), 0}, before);
+      if (found == edges.end() || found->low != std::min(a, b) || found->high != std::max(a, b)) continue;
+      for (const int v : {a, b})
+        merge(labels[c].pieces,
+              bone_at(found->bone, skin.to_unit(lattice_.complex.points.row(v).transpose()))[0]);
+    }
+  }
+  const CellLocator locator(lattice_.complex);
+  std::vector<int> cells;
+  for (int b = 0; b < static_cast<int>(lattice_.bones.size()); ++b) {
+    const LatticeBone& bone = lattice_.bones[b];
+    if (!bone.soft) continue;
+    const double spacing = kSoftBoneSpacing * lattice_.edge_length;
+    const int n =
+        std::max(1, static_cast<int>(std::ceil((bone.rest_end - bone.rest_start).norm() / spacing)));
+    for (int i = 0; i <= n; ++i) {
+      const Vector3d p = bone.rest_start + (bone.rest_end - bone.rest_start) * (static_cast<double>(i) / n);
+      locator.find_all(p, kInsideSlack, cells);
+      for (int c : cells) merge(labels[c].pieces, bone_at(b, skin.to_unit(p))[0]);
+    }
+  }
+  for (const SoftFrame& soft : skeleton_.soft_frames) {
+    locator.find_all(skin.to_rest(soft.position), kInsideSlack, cells);
+    for (int c : cells) add(labels[c], soft.frame, soft.position);
+  }
+}
+
+std::vector<Limb> LimbMap::gather(const Label& label) const {
+  std::vector<LimbPiece> pieces = label.pieces;
+  std::sort(pieces.begin(), pieces.end(), is_before);
+  const int n = static_cast<int>(pieces.size());
+  std::vector<int> group(n);
+  std::iota(group.begin(), group.end(), 0);
+  const auto root = [&](int i) {
+    while (group[i] != i) i = group[i];
+    return i;
+  };
+  const auto is_joined = [&](int a, int b) {
+    return std::any_of(label.joined.begin(), label.joined.end(), [&](const std::array<int, 2>& pair) {
+      return (pair[0] == a && pair[1] == b) || (pair[0] == b && pair[1] == a);
+    });
+  };
+  for (int i = 0; i < n; ++i)
+    for (int k = i + 1; k < n; ++k) {
+      const int a = root(i), b = root(k);
+      if (a != b && (are_together({pieces[i]}, {pieces[k]}) || is_joined(pieces[i].frame, pieces[k].frame)))
+        group[std::max(a, b)] = std::min(a, b);
+    }
+  std::vector<Limb> limbs;
+  std::vector<int> limb_of(n, -1);
+  for (int i = 0; i < n; ++i) {
+    int& limb = limb_of[root(i)];
+    if (limb < 0) {
+      limb = static_cast<int>(limbs.size());
+      limbs.emplace_back();
+    }
+    limbs[limb].push_back(pieces[i]);
+  }
+  return limbs;
+}
+
+double LimbMap::distance(const Limb& a, const Limb& b) const {
+  double shortest = std::numeric_limits<double>::infinity();
+  for (const LimbPiece& x : a)
+    for (const LimbPiece& y : b) {
+      if (x.frame == y.frame) return 0.0;
+      shortest = std::min(shortest, distance_.between(x.stretch, y.stretch));
+    }
+  return shortest;
+}
+
+bool LimbMap::are_together(const Limb& a, const Limb& b) const { return distance(a, b) < kLimbDistance * h_; }
+
+Limb LimbMap::flesh_at(const Vector3d& p) const {
+  const UnitSkin& skin = input_.unit_skin;
+  const SurfaceQuery::Closest closest = skin.query.closest(p);
+  int nearest = -1;
+  double best = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const int v = skin.triangles(closest.triangle, k);
+    const double d = (skin.points.row(v).transpose() - closest.point).squaredNorm();
+    if (d < best) best = d, nearest = frame_of_vertex_[v];
+  }
+  if (nearest < 0) return {};
+  return {piece_at(nearest, closest.point)};
+}
+
+Limb LimbMap::bone_at(int bone, const Vector3d& p) const {
+  const Vector3d start = skeleton_.nodes[skeleton_.bones[bone].start].position;
+  const Vector3d end = skeleton_.nodes[skeleton_.bones[bone].end].position;
+  const double s = std::clamp((p - start).dot(end - start) / (end - start).squaredNorm(), 0.0, 1.0);
+  return {{skeleton_.bones[bone].frame, {bone, s, s}}};
+}
+
+}  // namespace sinew::lattice::detail

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "lattice/control_lattice.h"
+#include "lattice/detail/rig_input.h"
+#include "lattice/detail/skeleton_distance.h"
+
+namespace sinew::lattice::detail {
+
+/// A face of a complex of which no face belongs to more than two cells.
+struct CellFace {
+  std::array<int, 4> vertices;  ///< outward from `first`; the fourth of a triangle is -1.
+  int first = -1;               ///< cell.
+  int second = -1;              ///< cell; -1 on the boundary.
+};
+
+/// Every face once, in an order that depends on the vertex indices alone.
+std::vector<CellFace> faces_of(const CellComplex& complex);
+
+/// Flesh that hangs on one stretch of a bone.
+struct LimbPiece {
+  int frame = -1;  ///< joint.
+  BoneStretch stretch;
+};
+
+/// The part of one limb that lies in one place; ascending by frame and bone, empty where nobody knows.
+using Limb = std::vector<LimbPiece>;
+
+/// Which limbs lie in which cell. Skin and bones in a cell are of one limb if they follow the same frame, if
+/// one triangle of the skin hangs on both, or if they are less than 1.5 h apart along the skeleton.
+class LimbMap {
+ public:
+  /// `faces` are those of `lattice.complex`; everything must outlive the map.
+  LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const ControlLattice& lattice,
+          const std::vector<CellFace>& faces);
+
+  /// The limbs in a cell, ascending; none where neither skin nor bone is in it.
+  const std::vector<Limb>& limbs(int cell) const { return limbs_[cell]; }
+  /// Shortest way along the skeleton, unit coordinates; 0 where they follow the same frame.
+  double distance(const Limb& a, const Limb& b) const;
+  bool are_together(const Limb& a, const Limb& b) const;
+  /// Of the flesh at p (unit coordinates, inside the skin): as the closest skin.
+  Limb flesh_at(const Eigen::Vector3d& p) const;
+  /// Of the bone at a vertex of its chain.
+  Limb bone_at(int bone, const Eigen::Vector3d& p) const;
+  /// The frame of every joint before floating parts get soft frames of their own.
+  const std::vector<int>& frame_of_joint() const { return frame_of_joint_; }
+
+ private:
+  /// What is known of a cell before its pieces are gathered to limbs.
+  struct Label {
+    std::vector<LimbPiece> pieces;
+    std::vector<std::array<int, 2>> joined;  ///< frames.
+  };
+  struct Corners {
+    std::array<Eigen::Vector3d, 3> points;
+    std::array<int, 3> frames;
+  };
+
+  LimbPiece piece_at(int frame, const Eigen::Vector3d& p) const;
+  void add(Label& label, int frame, const Eigen::Vector3d& p) const;
+  void add_triangle(Label& label, const std::array<int, 3>& frames, const Eigen::Vector3d& p) const;
+  void label_skin(std::vector<Label>& labels, const std::vector<CellFace>& faces) const;
+  void label_bones(std::vector<Label>& labels) const;
+  std::vector<Limb> gather(const Label& label) const;
+
+  const RigInput& input_;
+  const ReducedSkeleton& skeleton_;
+  const ControlLattice& lattice_;
+  SkeletonDistance distance_;
+  double h_;                                ///< unit coordinates.
+  std::vector<int> frame_of_joint_;         ///< with the soft frames of the skeleton.
+  std::vector<std::vector<int>> bones_of_;  ///< per joint: those its weight counts for.
+  std::vector<int> frame_of_vertex_;        ///< of the welded skin.
+  std::vector<std::vector<Limb>> limbs_;
+};
+
+}  // namespace sinew::lattice::detail
