@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "lattice/detail/finish.h"
+#include "lattice/detail/hexahedral_grid.h"
 #include "lattice/detail/inspection.h"
 #include "lattice/detail/lattice_points.h"
 #include "lattice/detail/optimise.h"
@@ -140,13 +141,26 @@ bool is_better(const Outcome& a, const Outcome& b, const BuildOptions& options) 
   return shape(a) > shape(b);
 }
 
-Outcome try_out(const RigInput& input, double h, const Attempt& attempt, const BuildOptions& options) {
+Outcome judged(ControlLattice lattice, const RigInput& input, const BuildOptions& options) {
   Outcome outcome;
-  outcome.lattice = make_attempt(input, h * attempt.h_factor, attempt);
+  outcome.lattice = std::move(lattice);
   outcome.found = inspect(outcome.lattice, input.skin, input.unit_skin);
   outcome.lattice.quality = outcome.found.quality;
   outcome.failures = judge(outcome.found, options);
   return outcome;
+}
+
+Outcome try_out(const RigInput& input, double h, const Attempt& attempt, const BuildOptions& options) {
+  return judged(make_attempt(input, h * attempt.h_factor, attempt), input, options);
+}
+
+/// The last resort: cubes, and soft bones.
+Outcome try_grid(const RigInput& input, const BuildOptions& options) {
+  const double side = options.cell_size ? *options.cell_size / input.unit_skin.scale
+                                        : find_grid_side(input.unit_skin, options.cells);
+  ReductionOptions reduction;
+  reduction.tip_bones = options.tip_bones;
+  return judged(hexahedral_lattice(input, side, reduction), input, options);
 }
 
 }  // namespace
@@ -154,6 +168,10 @@ Outcome try_out(const RigInput& input, double h, const Attempt& attempt, const B
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
   options.validate();
   const RigInput input = make_rig_input(skin, joints, options);
+  if (options.construction == Construction::Grid) {
+    Outcome grid = try_grid(input, options);
+    return {std::move(grid.lattice), std::move(grid.failures), {}};
+  }
   const std::vector<Attempt> planned = planned_attempts(options);
   const double h = options.cell_size ? *options.cell_size / input.unit_skin.scale
                                      : find_edge_length(input, options.cells, planned.front());
@@ -180,6 +198,11 @@ BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptio
     attempt.name = fmt::format("{}, {} bones soft", base, attempt.reduction.soft_bones.size());
     passed = passes(attempt);
     if (best_attempt.name != attempt.name) break;  // it did not help
+  }
+  if (!passed && options.construction == Construction::Auto) {
+    Outcome grid = try_grid(input, options);
+    if (!grid.failures.empty()) result.refused.push_back({"grid of cubes", grid.failures});
+    if (is_better(grid, *best, options)) best = std::move(grid);
   }
   result.lattice = std::move(best->lattice);
   result.failures = std::move(best->failures);

@@ -21,6 +21,13 @@ enum class TipBones { On, Off };
 /// Whether the builder looks for a plane of symmetry and mirrors one half.
 enum class Symmetry { Auto, Off };
 
+/// What the builder makes.
+enum class Construction {
+  Auto,        ///< tetrahedra; a grid of cubes where the gate refuses all of them.
+  Tetrahedra,  ///< with the bones as edges.
+  Grid         ///< of cubes, with soft bones.
+};
+
 /// Controls of the lattice builder.
 struct BuildOptions {
   /// Wanted number of cells [-]; >= 20. The secant search on h lands within about 10 %.
@@ -40,8 +47,10 @@ struct BuildOptions {
   /// With Auto, a rig that is its own mirror image to 1e-5 of its size gets a lattice that is its own mirror
   /// image.
   Symmetry symmetry = Symmetry::Auto;
-  /// Retries after a failed gate; 0 = one attempt only. What varies is the place and size of the grid, then
-  /// the thresholds that reduce the skeleton; in the end bones at refused cells become soft, one by one.
+  Construction construction = Construction::Auto;
+  /// Retries with tetrahedra after a failed gate; 0 = one attempt only. What varies is the place and size of
+  /// the grid, then the thresholds that reduce the skeleton; in the end bones at refused cells become soft,
+  /// one by one.
   int max_retries = 12;
   /// Gate thresholds.
   double min_dihedral_degrees = 10.0;
@@ -77,7 +86,8 @@ struct BuildResult {
   std::vector<RefusedAttempt> refused;  ///< in order; with a lattice that failed, all attempts.
 };
 
-/// Builds a lattice of tetrahedra round `skin` in which the bones of `joints` are chains of edges.
+/// Builds a lattice of tetrahedra round `skin` in which the bones of `joints` are chains of edges; where the
+/// gate refuses every attempt, a plain grid of cubes with soft bones.
 /// Deterministic. `skin.weights` name joints of the tree. Throws std::invalid_argument where there is no
 /// triangle, no joint or no weight at all, or a coordinate is not finite.
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options = {});

@@ -117,6 +117,8 @@ struct ControlLattice {
   /// weight counts for; -1 where there is none at all.
   std::vector<int> frame_of_joint;
   double edge_length = 0.0;  ///< target edge h [m].
+  /// A plain grid of cubes, all bones soft: the builder's last resort.
+  bool is_grid = false;
   int retries = 0;           ///< how many attempts the gate refused.
   /// Regions of the user's file (physical groups, references): the number of every cell's, or empty.
   std::vector<int> regions;

@@ -42,6 +42,9 @@ void report_lattice(const Scene& scene, const lattice::BuildResult& result, cons
     }
     talk("warning: lattice: " + failure.what);
   }
+  if (result.lattice.is_grid && !result.refused.empty())
+    talk("warning: lattice: a plain grid of cubes with soft bones, as with bones on edges " +
+         result.refused.front().failures.front().what);
 }
 
 /// Poses of the whole clip, `spacing` apart; enough to see every bend of a clip keyed at 24 to 60 Hz.

@@ -65,7 +65,8 @@ std::string gate_message(const std::string& rig, const lattice::BuildResult& res
       shown.what, more, result.lattice.retries, 2 * result.lattice.complex.cells.size());
 }
 
-void print_summary(const std::string& output, const lattice::ControlLattice& lattice, double seconds) {
+void print_summary(const std::string& output, const lattice::BuildResult& result, double seconds) {
+  const lattice::ControlLattice& lattice = result.lattice;
   const lattice::LatticeQuality& q = lattice.quality;
   int hard = 0, tips = 0, soft = 0;
   for (const lattice::LatticeBone& bone : lattice.bones) {
@@ -74,6 +75,10 @@ void print_summary(const std::string& output, const lattice::ControlLattice& lat
   }
   fmt::print(stderr, "{}: {} cells, {} vertices, edges of about {:.3g} m, in {:.2f} s\n", output,
              lattice.complex.cells.size(), lattice.complex.points.rows(), lattice.edge_length, seconds);
+  if (lattice.is_grid && !result.refused.empty()) {
+    fmt::print(stderr, "  a plain grid of cubes with soft bones, as with bones on edges {}\n",
+               result.refused.front().failures.front().what);
+  }
   fmt::print(stderr, "  bones: {} on edges ({} of them tip bones), {} soft, {} soft frames\n", hard, tips,
              soft, lattice.soft_frames.size());
   fmt::print(
@@ -104,6 +109,7 @@ std::string lattice_report(const lattice::ControlLattice& lattice, const lattice
     json["cells"].push_back(
         std::vector<int>(cell.vertices.begin(), cell.vertices.begin() + num_corners(cell.type)));
   json["edge_length"] = lattice.edge_length;
+  json["grid"] = lattice.is_grid;
   json["bones"] = Json::array();
   json["tip_bones"] = Json::array();
   json["soft_bones"] = Json::array();
@@ -219,7 +225,7 @@ void run_lattice(const LatticeRequest& request) {
     assets::keep_lattice(assets::cache_folder(scene.output), built.key, built.result, input.joints);
   if (scene.json) std::cout << lattice_report(lattice, input.joints);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  print_summary(scene.output, lattice, elapsed.count());
+  print_summary(scene.output, built.result, elapsed.count());
 }
 
 void add_lattice_command(CLI::App& app, CommandContext&) {

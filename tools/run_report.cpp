@@ -41,6 +41,8 @@ Json lattice_json(const lattice::ControlLattice& lattice) {
           {"vertices", lattice.complex.points.rows()},
           {"edge_length_m", lattice.edge_length},
           {"retries", lattice.retries},
+          {"grid", lattice.is_grid},
+          {"copies", lattice.copies.size()},
           {"bones", bones},
           {"changes", changes}};
 }

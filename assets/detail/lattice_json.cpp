@@ -171,6 +171,7 @@ std::string lattice_to_json(const lattice::ControlLattice& lattice, const lattic
   json["version"] = kVersion;
   json["edge_length"] = lattice.edge_length;
   json["retries"] = lattice.retries;
+  json["grid"] = lattice.is_grid;
   json["bones"] = Json::array();
   for (const lattice::LatticeBone& bone : lattice.bones)
     json["bones"].push_back(bone_to_json(bone, joints.names));
@@ -208,6 +209,7 @@ lattice::Coincidence lattice_from_json(const std::string& where, const std::stri
     reader.fail("version, got " + std::to_string(version) + ", expected " + std::to_string(kVersion));
   lattice.edge_length = reader.get<double>(json, "edge_length");
   lattice.retries = reader.get<int>(json, "retries");
+  lattice.is_grid = reader.get<bool>(json, "grid");
   for (const Json& bone : reader.at(json, "bones")) lattice.bones.push_back(bone_from_json(bone, reader));
   for (const Json& frame : reader.at(json, "soft_frames"))
     lattice.soft_frames.push_back({reader.joint(frame, "frame"), reader.point(frame, "position")});
