@@ -43,13 +43,15 @@ std::vector<FloatingSkin> skin_of_components(const RigInput& input, const Contro
   const LimbCopies copies(lattice);
   std::vector<FloatingSkin> parts(num_components);
   for (FloatingSkin& part : parts) part.weight.assign(input.joints.parents.size(), 0.0);
-  for (std::size_t v = 0; v < input.skin.weights.size(); ++v) {
-    const Vector3d p = input.skin.points.row(static_cast<Eigen::Index>(v)).transpose();
+  // The welded skin: its order, and so the order of the sums, does not depend on the input's.
+  const UnitSkin& skin = input.unit_skin;
+  for (std::size_t v = 0; v < skin.weights.size(); ++v) {
+    const Vector3d p = skin.to_rest(skin.points.row(static_cast<Eigen::Index>(v)).transpose());
     int cell = locator.find(p, kInsideSlack);
-    if (cell >= 0) cell = copies.own_copy(cell, skin_frame(input.skin.weights[v], lattice.frame_of_joint), p);
+    if (cell >= 0) cell = copies.own_copy(cell, skin_frame(skin.weights[v], lattice.frame_of_joint), p);
     if (cell < 0 || component_of[cell] < 0) continue;
     FloatingSkin& part = parts[component_of[cell]];
-    for (const Influence& influence : input.skin.weights[v])
+    for (const Influence& influence : skin.weights[v])
       part.weight[input.stand_in[influence.frame]] += influence.weight;
     part.sum += p;
     part.count += 1.0;

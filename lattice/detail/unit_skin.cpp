@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <unordered_map>
 
 #include <Eigen/Geometry>
@@ -29,6 +31,24 @@ struct GridHash {
            static_cast<std::size_t>(k[2] * 83492791);
   }
 };
+
+/// Vertices ascending by position, then by weights: an order that the numbering of the input has no part in,
+/// so that everything built from it has none either.
+std::vector<int> canonical_order(const Points& points, const std::vector<std::vector<Influence>>& weights) {
+  std::vector<int> order(static_cast<std::size_t>(points.rows()));
+  std::iota(order.begin(), order.end(), 0);
+  const auto before = [](const Influence& x, const Influence& y) {
+    return std::tie(x.frame, x.weight) < std::tie(y.frame, y.weight);
+  };
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    for (int k = 0; k < 3; ++k)
+      if (points(a, k) != points(b, k)) return points(a, k) < points(b, k);
+    if (weights.empty()) return false;
+    return std::lexicographical_compare(weights[a].begin(), weights[a].end(), weights[b].begin(),
+                                        weights[b].end(), before);
+  });
+  return order;
+}
 
 /// For every point the lowest-numbered earlier representative within the weld distance, or itself.
 std::vector<int> weld(const Points& points) {
@@ -62,6 +82,10 @@ std::vector<std::array<int, 3>> clean_triangles(const Triangles& triangles,
     if (!((b - a).cross(c - a).norm() > 1e-14)) continue;  // area 1e-14 of a unit box: rounding only
     kept.push_back(tri);
   }
+  // In an order of their own, whatever the input's.
+  for (std::array<int, 3>& tri : kept)
+    std::rotate(tri.begin(), std::min_element(tri.begin(), tri.end()), tri.end());
+  std::sort(kept.begin(), kept.end());
   // Of triangles with the same three vertices the first stays.
   std::vector<std::pair<std::array<int, 3>, int>> order;
   for (int t = 0; t < static_cast<int>(kept.size()); ++t) {
@@ -166,17 +190,19 @@ UnitSkin make_unit_skin(const Surface& skin) {
   if (!(scale > 0.0)) throw std::invalid_argument("lattice: all skin vertices are one point");
   const Points unit = (skin.points.rowwise() - centre.transpose()) / scale;
 
-  const std::vector<int> representative = weld(unit);
+  const std::vector<int> order = canonical_order(unit, skin.weights);
+  const std::vector<int> representative = weld(unit(order, Eigen::all));
   std::vector<int> new_vertex(unit.rows());
   std::vector<int> kept;
   std::vector<std::vector<Influence>> weights;
-  for (int v = 0; v < unit.rows(); ++v) {
-    if (representative[v] == v) {
+  for (int i = 0; i < unit.rows(); ++i) {
+    const int v = order[i];
+    if (representative[i] == i) {
       new_vertex[v] = static_cast<int>(kept.size());
       kept.push_back(v);
       weights.push_back(skin.weights.empty() ? std::vector<Influence>{} : skin.weights[v]);
     } else {
-      new_vertex[v] = new_vertex[representative[v]];
+      new_vertex[v] = new_vertex[order[representative[i]]];
       if (weights[new_vertex[v]].empty() && !skin.weights.empty()) weights[new_vertex[v]] = skin.weights[v];
     }
   }
