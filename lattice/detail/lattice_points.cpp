@@ -17,6 +17,8 @@ constexpr double kBoneSpacing = 1.1;  ///< of bone samples, in units of h.
 constexpr double kGridReach = 1.2;
 /// Half the length of a bone piece, and a little more for rounding.
 constexpr double kMiddleBall = 0.51;
+/// Bone pieces are looked for this far away, in units of h.
+constexpr double kClearanceReach = 2.0;
 
 void place_bones(const ReducedSkeleton& skeleton, double h, LatticePoints& out) {
   std::vector<int> vertex_of_node(skeleton.nodes.size(), -1);
@@ -56,10 +58,41 @@ BoneClearance::BoneClearance(const LatticePoints& points, double h, const PointO
       pieces_.push_back(
           {a, b, options.exclusion * std::min(h, std::max(length, 0.5 * h)), kMiddleBall * length});
     }
+  if (pieces_.empty()) return;
+  side_ = kClearanceReach * h;
+  Vector3d high = pieces_[0].a;
+  low_ = high;
+  for (const Piece& piece : pieces_) {
+    side_ = std::max({side_, piece.radius, 2.0 * piece.middle_radius});
+    low_ = low_.cwiseMin(piece.a).cwiseMin(piece.b);
+    high = high.cwiseMax(piece.a).cwiseMax(piece.b);
+  }
+  const Vector3d margin = Vector3d::Constant(side_);
+  low_ -= margin;
+  count_ = ((high + margin - low_) / side_).array().floor().cast<int>() + 1;
+  bins_.resize(static_cast<std::size_t>(count_.prod()));
+  for (int i = 0; i < static_cast<int>(pieces_.size()); ++i) {
+    const Vector3d from = pieces_[i].a.cwiseMin(pieces_[i].b) - margin;
+    const Vector3d to = pieces_[i].a.cwiseMax(pieces_[i].b) + margin;
+    const Eigen::Vector3i first = ((from - low_) / side_).array().floor().cast<int>().max(0);
+    const Eigen::Vector3i last = ((to - low_) / side_).array().floor().cast<int>().min((count_.array() - 1));
+    for (int x = first.x(); x <= last.x(); ++x)
+      for (int y = first.y(); y <= last.y(); ++y)
+        for (int z = first.z(); z <= last.z(); ++z) bins_[(x * count_.y() + y) * count_.z() + z].push_back(i);
+  }
+}
+
+const std::vector<int>& BoneClearance::pieces_near(const Vector3d& p) const {
+  const Eigen::Array3d at = ((p - low_) / side_).array().floor();
+  if ((at < 0.0).any() || (at >= count_.cast<double>().array()).any()) return none_;
+  const Eigen::Vector3i bin = at.cast<int>();
+  return bins_[(bin.x() * count_.y() + bin.y()) * count_.z() + bin.z()];
 }
 
 bool BoneClearance::is_too_close(const Vector3d& p) const {
-  return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) {
+  const std::vector<int>& near = pieces_near(p);
+  return std::any_of(near.begin(), near.end(), [&](int i) {
+    const Piece& piece = pieces_[i];
     return (p - 0.5 * (piece.a + piece.b)).squaredNorm() < piece.middle_radius * piece.middle_radius ||
            point_segment_distance(p, piece.a, piece.b) < piece.radius;
   });
@@ -67,8 +100,9 @@ bool BoneClearance::is_too_close(const Vector3d& p) const {
 
 double BoneClearance::distance(const Vector3d& p) const {
   double nearest = std::numeric_limits<double>::infinity();
-  for (const Piece& piece : pieces_) nearest = std::min(nearest, point_segment_distance(p, piece.a, piece.b));
-  return nearest;
+  for (int i : pieces_near(p))
+    nearest = std::min(nearest, point_segment_distance(p, pieces_[i].a, pieces_[i].b));
+  return nearest <= side_ ? nearest : std::numeric_limits<double>::infinity();
 }
 
 LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton, double h,

@@ -42,7 +42,8 @@ class BoneClearance {
  public:
   BoneClearance(const LatticePoints& points, double h, const PointOptions& options);
   bool is_too_close(const Eigen::Vector3d& p) const;
-  double distance(const Eigen::Vector3d& p) const;  ///< to the nearest bone piece; infinite without bones.
+  /// To the nearest bone piece where it is nearer than 2 h, else infinite.
+  double distance(const Eigen::Vector3d& p) const;
 
  private:
   struct Piece {
@@ -50,7 +51,14 @@ class BoneClearance {
     double radius;         ///< about the piece.
     double middle_radius;  ///< about its midpoint.
   };
+  const std::vector<int>& pieces_near(const Eigen::Vector3d& p) const;
+
   std::vector<Piece> pieces_;
+  Eigen::Vector3d low_{0, 0, 0};
+  double side_ = 1.0;
+  Eigen::Vector3i count_{0, 0, 0};
+  std::vector<std::vector<int>> bins_;  ///< pieces within reach of some point of each bin.
+  std::vector<int> none_;
 };
 
 /// Joints, bone samples every 1.1 h, and a body-centred cubic grid of nearest distance h, symmetric about the
