@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -91,6 +92,10 @@ struct BuildResult {
 /// Deterministic. `skin.weights` name joints of the tree. Throws std::invalid_argument where there is no
 /// triangle, no joint or no weight at all, or a coordinate is not finite.
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options = {});
+
+/// What build() takes of memory at its peak for so many cells [bytes], without the skin; within a factor
+/// of 2.
+std::size_t estimated_build_bytes(int cells);
 
 /// Quality of any lattice against a skin, and the gate on it.
 LatticeQuality measure_quality(const ControlLattice& lattice, const Surface& skin);

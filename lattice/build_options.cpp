@@ -25,6 +25,12 @@ void check_joint(const char* field, int joint, int num_joints) {
 
 }  // namespace
 
+std::size_t estimated_build_bytes(int cells) {
+  // Measured peaks of whole builds at 1e4 and 1e5 cells; the rest is what a program takes without a lattice.
+  constexpr std::size_t kPerCell = 2000, kBase = 20'000'000;
+  return kBase + kPerCell * static_cast<std::size_t>(cells);
+}
+
 void BuildOptions::validate() const {
   require(cells >= 20, "cells", cells, "at least 20");
   if (cell_size) {

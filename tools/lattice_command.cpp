@@ -1,11 +1,15 @@
 #include "tools/lattice_command.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <set>
+
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -51,6 +55,29 @@ void check_request(const LatticeRequest& request) {
     if (!scene.overwrite && std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
       throw assets::BusyError(file + ": is there already; hint: give --overwrite or another name");
   }
+}
+
+/// Memory that this process may use [bytes]: the machine's, or less where a limit is set.
+double available_bytes() {
+  double bytes = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
+    bytes = std::min(bytes, static_cast<double>(limit.rlim_cur));
+  return bytes;
+}
+
+/// States what a large lattice will take, and refuses what there is no room for.
+void check_memory(int cells) {
+  constexpr int kWorthSaying = 10'000;
+  const auto estimate = static_cast<double>(lattice::estimated_build_bytes(cells));
+  const double available = available_bytes();
+  if (estimate > available)
+    throw assets::LimitError(
+        fmt::format("--cells: got {}, which takes about {:.2g} GB of memory, the limit is {:.2g} GB; hint: "
+                    "1000 cells suffice for most characters",
+                    cells, 1e-9 * estimate, 1e-9 * available));
+  if (cells >= kWorthSaying)
+    fmt::print(stderr, "about {:.2g} GB of memory for {} cells\n", 1e-9 * estimate, cells);
 }
 
 /// One line for the failures of the gate, the worst first.
@@ -216,6 +243,7 @@ void run_lattice(const LatticeRequest& request) {
   load.height = scene.height.value_or(0.0);
   const assets::Rig rig = assets::load_rig(scene.rig, load);
   const assets::LatticeInput input = assets::lattice_input(rig);
+  check_memory(request.cells);
   stop_if_interrupted("before building the lattice");
   const assets::CachedBuild built = make_lattice(scene, rig, input);
   const lattice::ControlLattice& lattice = built.result.lattice;
