@@ -163,7 +163,8 @@ TEST_F(LimbCopiesInMotion, ALegDoesNotFeelWhatTheOtherOneDoes) {
   double moved = 0.0;
   for (int v : legs_.vertices[1]) moved = std::max(moved, (apart.row(v) - alone.row(v)).norm());
   EXPECT_GT(moved, 0.3);
-  for (int v : legs_.vertices[0]) EXPECT_EQ(apart.row(v), alone.row(v)) << "vertex " << v;
+  // The factor sweeps through both legs at once: rounding on positions of size 1.
+  for (int v : legs_.vertices[0]) EXPECT_LE((apart.row(v) - alone.row(v)).norm(), 1e-11) << "vertex " << v;
 }
 
 TEST_F(LimbCopiesInMotion, ALegMovesAsIfItWereAlone) {

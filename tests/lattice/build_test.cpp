@@ -194,7 +194,8 @@ Limb fan() {
 TEST(Build, ReducesTheSkeletonFartherWhereTheGateRefuses) {
   const Limb limb = fan();
   // Between three directions 25 degrees apart the Jacobian is at most sin(25) sin(25) cos(12.5) = 0.17.
-  BuildOptions options{.cells = 300, .max_retries = 0, .min_scaled_jacobian = 0.2};
+  BuildOptions options{
+      .cells = 300, .construction = Construction::Tetrahedra, .max_retries = 0, .min_scaled_jacobian = 0.2};
   const BuildResult first = build(limb.skin, limb.joints, options);
   ASSERT_EQ(first.refused.size(), 1u);
   EXPECT_EQ(first.refused[0].name, "as asked");
@@ -216,7 +217,8 @@ TEST(Build, ReducesTheSkeletonFartherWhereTheGateRefuses) {
 
 TEST(Retries, FindTheBoneThatSpoilsACell) {
   const Limb limb = fan();
-  const BuildOptions options{.cells = 300, .max_retries = 0, .min_scaled_jacobian = 0.2};
+  const BuildOptions options{
+      .cells = 300, .construction = Construction::Tetrahedra, .max_retries = 0, .min_scaled_jacobian = 0.2};
   const ControlLattice lattice = build(limb.skin, limb.joints, options).lattice;
   const detail::Inspection found = detail::inspect(lattice, limb.skin, detail::make_unit_skin(limb.skin));
   const std::optional<detail::SoftBone> bone = detail::offending_bone(lattice, found, options);

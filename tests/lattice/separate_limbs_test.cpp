@@ -22,11 +22,11 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-/// The two legs of limbs.h in so few cells that many hold skin of both: edges of about 0.3 across a gap of
+/// The two legs of limbs.h in so few cells that many hold skin of both: edges of about 0.32 across a gap of
 /// 0.12.
 struct Legs {
   tests::Character character = tests::two_legs();
-  BuildResult result = build(character.skin, character.joints, {.cells = 120});
+  BuildResult result = build(character.skin, character.joints, {.cells = 220});
   const ControlLattice& lattice = result.lattice;
 };
 
@@ -105,10 +105,12 @@ TEST(SeparateLimbs, LeavesNoVertexToBothLegsBelowTheHips) {
     for (int k = 0; k < 4; ++k) {
       const int v = legs.lattice.complex.cells[copy.cell].vertices[k];
       if (legs.lattice.complex.points(v, 1) > 1.3) continue;
-      for (int frame : copy.frames) sides[v].insert(side_of_joint(frame));
+      for (int frame : copy.frames)
+        if (side_of_joint(frame) != 'p') sides[v].insert(side_of_joint(frame));  // the pelvis goes with both
     }
   EXPECT_GE(sides.size(), 20u);
-  for (const auto& [v, letters] : sides) EXPECT_EQ(letters.size(), 1u) << "vertex " << v;
+  for (const auto& [v, letters] : sides)
+    EXPECT_EQ(letters.size(), 1u) << "vertex " << v << " at " << legs.lattice.complex.points.row(v);
   for (const LatticeBone& bone : legs.lattice.bones)
     for (int v : bone.chain)
       if (sides.contains(v)) {
