@@ -36,9 +36,12 @@ struct Draft {
   Tetrahedra cells;
 };
 
+Halves halves(const RigInput& input) { return input.mirror ? Halves::OneMirrored : Halves::Both; }
+
 Draft make_draft(const RigInput& input, double h, const Attempt& attempt, const SkinSamples& samples) {
   Draft draft;
-  draft.skeleton = reduce_skeleton(input.unit_skin, input.unit_joints, input.weights, h, attempt.reduction);
+  draft.skeleton = reduce_skeleton(input.unit_skin, input.unit_joints, input.weights, h, attempt.reduction,
+                                   input.mirror_joint());
   draft.points = place_points(input.unit_skin, draft.skeleton, h, attempt.points);
   draft.cells = tetrahedralise(draft.points, draft.skeleton, samples, h, attempt.points).cells;
   return draft;
@@ -64,8 +67,9 @@ double find_edge_length(const RigInput& input, int wanted, const Attempt& attemp
   double old_x = 0.0, old_y = 0.0, slope = -2.3;  // cells go like h^-3 in a bulk, h^-2 in a skin
   for (int step = 0; step < kSearchSteps; ++step) {
     const double h = std::exp(x);
-    const Draft draft = make_draft(input, h, attempt, sample_skin(input.unit_skin, h));
-    const double y = std::log(static_cast<double>(std::max<std::size_t>(1, draft.cells.size())));
+    const Draft draft = make_draft(input, h, attempt, sample_skin(input.unit_skin, h, halves(input)));
+    const std::size_t cells = draft.cells.size() * (draft.points.half ? 2 : 1);
+    const double y = std::log(static_cast<double>(std::max<std::size_t>(1, cells)));
     if (std::abs(y - target) < best_error) best_error = std::abs(y - target), best_x = x;
     if (best_error < kCloseEnough) break;
     if (step > 0 && std::abs(x - old_x) > 1e-9) slope = std::clamp((y - old_y) / (x - old_x), -4.0, -1.2);
@@ -74,6 +78,31 @@ double find_edge_length(const RigInput& input, int wanted, const Attempt& attemp
     x = std::max(x + std::clamp((target - y) / slope, -1.2, 1.2), lowest);
   }
   return std::exp(best_x);
+}
+
+/// The whole lattice of a half. Every bone that is not there yet gets its partner's chain.
+void add_mirror_image(Draft& draft) {
+  LatticePoints& points = draft.points;
+  const int count = static_cast<int>(points.points.size());
+  std::vector<int> image(count);
+  for (int v = 0; v < count; ++v) {
+    image[v] = v;
+    if (points.is_in_plane(v)) continue;
+    LatticePoints::Place place = points.places[v];
+    if (place.bone >= 0) place.bone = draft.skeleton.mirror_bone[place.bone];
+    image[v] = points.add(reflected(points.points[v]), place);
+  }
+  for (std::size_t b = 0; b < points.chains.size(); ++b) {
+    const std::size_t other = static_cast<std::size_t>(draft.skeleton.mirror_bone[b]);
+    if (other <= b || points.chains[b].empty()) continue;
+    for (const int v : points.chains[b]) points.chains[other].push_back(image[v]);
+  }
+  const std::size_t cells = draft.cells.size();
+  for (std::size_t c = 0; c < cells; ++c) {
+    const auto [i, j, k, l] = draft.cells[c];
+    draft.cells.push_back({image[i], image[k], image[j], image[l]});
+  }
+  points.half = false;
 }
 
 /// From unit to rest coordinates, unused vertices dropped.
@@ -110,9 +139,10 @@ ControlLattice to_lattice(const RigInput& input, const Draft& draft, double h) {
 }
 
 ControlLattice make_attempt(const RigInput& input, double h, const Attempt& attempt) {
-  const SkinSamples samples = sample_skin(input.unit_skin, h);
+  const SkinSamples samples = sample_skin(input.unit_skin, h, halves(input));
   Draft draft = make_draft(input, h, attempt, samples);
   optimise(draft.points, draft.cells, draft.skeleton, input.unit_skin, samples, h);
+  if (draft.points.half) add_mirror_image(draft);
   ControlLattice lattice = to_lattice(input, draft, h);
   separate_limbs(input, draft.skeleton, lattice);
   hang_joints(input, draft.skeleton, lattice);
@@ -163,15 +193,8 @@ Outcome try_grid(const RigInput& input, const BuildOptions& options) {
   return judged(hexahedral_lattice(input, side, reduction), input, options);
 }
 
-}  // namespace
-
-BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
-  options.validate();
-  const RigInput input = make_rig_input(skin, joints, options);
-  if (options.construction == Construction::Grid) {
-    Outcome grid = try_grid(input, options);
-    return {std::move(grid.lattice), std::move(grid.failures), {}};
-  }
+/// The first attempt that passes, or the best of all.
+BuildResult best_attempt_of(const RigInput& input, const BuildOptions& options) {
   const std::vector<Attempt> planned = planned_attempts(options);
   const double h = options.cell_size ? *options.cell_size / input.unit_skin.scale
                                      : find_edge_length(input, options.cells, planned.front());
@@ -207,7 +230,41 @@ BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptio
   result.lattice = std::move(best->lattice);
   result.failures = std::move(best->failures);
   result.lattice.retries = static_cast<int>(result.refused.size()) - (result.failures.empty() ? 0 : 1);
+  result.no_mirror = input.no_mirror;
+  if (input.mirror) {
+    const Eigen::Vector3d normal = input.unit_skin.axes.row(0).transpose();
+    result.mirror = MirrorPlane{normal, normal.dot(input.unit_skin.centre)};
+  }
   return result;
+}
+
+}  // namespace
+
+BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
+  options.validate();
+  BuildOptions whole = options;
+  whole.symmetry = Symmetry::Off;
+  if (options.construction == Construction::Grid) {
+    Outcome grid = try_grid(make_rig_input(skin, joints, whole), whole);
+    BuildResult result;
+    result.lattice = std::move(grid.lattice);
+    result.failures = std::move(grid.failures);
+    return result;
+  }
+  const RigInput input = make_rig_input(skin, joints, options);
+  if (!input.mirror) return best_attempt_of(input, options);
+  // The grid is the last resort, after lattices that are not mirrored.
+  BuildOptions tetrahedra = options;
+  tetrahedra.construction = Construction::Tetrahedra;
+  BuildResult result = best_attempt_of(input, tetrahedra);
+  if (result.failures.empty()) return result;
+  // Half a lattice has less freedom than a whole one.
+  BuildResult other = best_attempt_of(make_rig_input(skin, joints, whole), whole);
+  if (!other.failures.empty()) return result;
+  other.no_mirror = "the gate refused every mirrored lattice";
+  other.lattice.retries += static_cast<int>(result.refused.size());
+  other.refused.insert(other.refused.begin(), result.refused.begin(), result.refused.end());
+  return other;
 }
 
 }  // namespace sinew::lattice

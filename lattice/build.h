@@ -79,12 +79,20 @@ struct RefusedAttempt {
   std::vector<GateFailure> failures;
 };
 
+/// The plane normal . x = offset [m].
+struct MirrorPlane {
+  Eigen::Vector3d normal{1, 0, 0};  ///< of length 1.
+  double offset = 0.0;
+};
+
 struct BuildResult {
   /// The attempt that passed, else the best: fewest intolerable failures, then fewest failures, then best
   /// shape.
   ControlLattice lattice;
   std::vector<GateFailure> failures;    ///< of that attempt.
   std::vector<RefusedAttempt> refused;  ///< in order; with a lattice that failed, all attempts.
+  std::optional<MirrorPlane> mirror;    ///< in which the lattice is its own mirror image to 1e-9 of its size.
+  std::string no_mirror;                ///< why it is not, one phrase; empty where it is.
 };
 
 /// Builds a lattice of tetrahedra round `skin` in which the bones of `joints` are chains of edges; where the

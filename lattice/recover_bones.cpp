@@ -162,7 +162,7 @@ void RecoverOptions::validate() const {
 ControlLattice recover_bones(const CellComplex& complex, const Surface& skin, const JointTree& joints,
                              const RecoverOptions& options, const Numbering& numbering) {
   options.validate();
-  const RigInput input = make_rig_input(skin, joints);
+  const RigInput input = make_rig_input(skin, joints, {.symmetry = Symmetry::Off});
   ControlLattice lattice;
   lattice.complex = complex;
   validate(lattice);

@@ -18,7 +18,10 @@ constexpr double kInsideSlack = 1e-9;  ///< rounding of the containment test, a 
 
 /// Rest position of a node: bit for bit the joint's where it is one.
 Vector3d rest_position(const RigInput& input, const SkeletonNode& node) {
-  const bool at_joint = node.position == Vector3d(input.unit_joints.positions.row(node.joint).transpose());
+  // Joints of a mirrored rig may have moved a little, and their bones with them.
+  const Vector3d joint = input.joints.positions.row(node.joint).transpose();
+  const bool at_joint = node.position == Vector3d(input.unit_joints.positions.row(node.joint).transpose()) &&
+                        node.position == input.unit_skin.to_unit(joint);
   return at_joint ? Vector3d(input.joints.positions.row(node.joint).transpose())
                   : input.unit_skin.to_rest(node.position);
 }

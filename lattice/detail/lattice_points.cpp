@@ -21,9 +21,14 @@ constexpr double kMiddleBall = 0.51;
 constexpr double kClearanceReach = 2.0;
 
 void place_bones(const ReducedSkeleton& skeleton, double h, LatticePoints& out) {
+  const auto is_placed = [&](const ReducedBone& bone) {
+    const bool other_half = out.half && (skeleton.nodes[bone.start].position.x() < 0.0 ||
+                                         skeleton.nodes[bone.end].position.x() < 0.0);
+    return !bone.soft && !other_half;
+  };
   std::vector<int> vertex_of_node(skeleton.nodes.size(), -1);
   for (const ReducedBone& bone : skeleton.bones) {
-    if (bone.soft) continue;
+    if (!is_placed(bone)) continue;
     for (int node : {bone.start, bone.end})
       if (vertex_of_node[node] < 0)
         vertex_of_node[node] = out.add(skeleton.nodes[node].position, {.bone = -1, .s = 0.0, .fixed = true});
@@ -31,7 +36,7 @@ void place_bones(const ReducedSkeleton& skeleton, double h, LatticePoints& out) 
   out.chains.resize(skeleton.bones.size());
   for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
     const ReducedBone& bone = skeleton.bones[b];
-    if (bone.soft) continue;
+    if (!is_placed(bone)) continue;
     const double length = (skeleton.nodes[bone.end].position - skeleton.nodes[bone.start].position).norm();
     const int pieces = std::max(1, static_cast<int>(std::lround(length / (kBoneSpacing * h))));
     out.chains[b].push_back(vertex_of_node[bone.start]);
@@ -108,14 +113,16 @@ double BoneClearance::distance(const Vector3d& p) const {
 LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton, double h,
                            const PointOptions& options) {
   LatticePoints out;
+  out.half = !skeleton.mirror_bone.empty();
   place_bones(skeleton, h, out);
   const BoneClearance clearance(out, h, options);
   // Cubes of side 2h/sqrt(3) with a point in the middle: neighbours along a diagonal are h apart.
   const double side = 2.0 * h / std::sqrt(3.0);
   const Vector3d reach = skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() + kGridReach * h;
-  const Vector3d shift = Vector3d::Constant(options.shift * side);
+  Vector3d shift = Vector3d::Constant(options.shift * side);
+  if (out.half) shift.x() = 0.0;
   const Eigen::Vector3i count = (2.0 * reach / side).array().ceil().cast<int>() + 1;
-  for (int i = -count.x(); i <= count.x(); ++i)
+  for (int i = out.half ? 0 : -count.x(); i <= count.x(); ++i)
     for (int j = -count.y(); j <= count.y(); ++j)
       for (int k = -count.z(); k <= count.z(); ++k) {
         if ((i - j) % 2 != 0 || (j - k) % 2 != 0) continue;  // all even or all odd

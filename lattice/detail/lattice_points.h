@@ -19,6 +19,11 @@ struct LatticePoints {
   std::vector<Place> places;  ///< one per point.
   /// Per bone of the reduced skeleton its vertices from start to end; empty for soft bones.
   std::vector<std::vector<int>> chains;
+  /// True where these are the half x >= 0 of a mirrored lattice: vertices with x = 0 stay in that plane, and
+  /// faces in it are no boundary.
+  bool half = false;
+
+  bool is_in_plane(int vertex) const { return half && points[vertex].x() == 0.0; }
 
   int add(const Eigen::Vector3d& p, const Place& place) {
     points.push_back(p);
@@ -62,7 +67,8 @@ class BoneClearance {
 };
 
 /// Joints, bone samples every 1.1 h, and a body-centred cubic grid of nearest distance h, symmetric about the
-/// centre of the skin's box, inside the skin and within 1.2 h of it.
+/// origin, inside the skin and within 1.2 h of it. Of a mirrored
+/// skeleton the half x >= 0 alone, with points on the plane.
 LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton, double h,
                            const PointOptions& options);
 

@@ -31,7 +31,7 @@ class Optimiser {
  public:
   Optimiser(LatticePoints& points, const Tetrahedra& cells, const ReducedSkeleton& skeleton,
             const UnitSkin& skin, const SkinSamples& samples, double h)
-      : mesh_(points.points, cells),
+      : mesh_(points.points, cells, points.half ? TetMesh::Half::PositiveX : TetMesh::Half::No),
         places_(points.places),
         skeleton_(skeleton),
         skin_(skin),
@@ -146,7 +146,8 @@ void Optimiser::pull(int v) {
   if (closest.distance < 1e-12) return;
   Vector3d outward = (p - closest.point) / closest.distance;
   if (skin_.is_inside(p)) outward = -outward;
-  const Vector3d target = closest.point + kOffset * h_ * outward;
+  Vector3d target = closest.point + kOffset * h_ * outward;
+  if (mesh_.is_in_plane(v)) target.x() = 0.0;
   if ((target - p).norm() < 0.02 * h_) return;
   const double limit = std::min(mesh_.star_quality(v), kPullQuality) - 1e-12;
   for (const double share : {1.0, 0.5, 0.25})
@@ -176,9 +177,12 @@ void Optimiser::climb(int v) {
       continue;
     }
     const Vector3d from = mesh_.points[v];
+    const bool in_plane = mesh_.is_in_plane(v);
     for (int n = 0; n < 27; ++n) {
       const Vector3d direction(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      if (n == 13 || !try_move(v, from + step * direction.normalized(), quality + 1e-9)) continue;
+      if (n == 13 || (in_plane && direction.x() != 0.0) ||
+          !try_move(v, from + step * direction.normalized(), quality + 1e-9))
+        continue;
       quality = mesh_.star_quality(v);
     }
   }

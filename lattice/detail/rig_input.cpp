@@ -63,14 +63,36 @@ RigInput make_rig_input(const Surface& skin, const JointTree& joints, const Buil
   check_weights(skin, static_cast<int>(joints.parents.size()));
   UnitSkin unit = make_unit_skin(skin);
   JointTree unit_joints = joints;
-  for (Eigen::Index j = 0; j < joints.positions.rows(); ++j)
-    unit_joints.positions.row(j) = unit.to_unit(joints.positions.row(j).transpose()).transpose();
+  const auto to_unit = [&] {
+    for (Eigen::Index j = 0; j < joints.positions.rows(); ++j)
+      unit_joints.positions.row(j) = unit.to_unit(joints.positions.row(j).transpose()).transpose();
+  };
+  to_unit();
   const std::vector<bool> excluded = excluded_joints(options, static_cast<int>(joints.parents.size()));
   std::vector<int> stand_in = stand_ins(excluded, joints.parents);
   bypass(excluded, unit_joints.parents);
   JointWeights weights = joint_weights(unit, unit_joints, stand_in);
+  MirrorSearch search;
+  search.why_not = "symmetry is off";
+  if (options.symmetry == Symmetry::Auto) search = find_mirror(unit, unit_joints, weights);
+  if (search.found) {
+    const MirrorFrame frame = mirror_frame(unit, search.mirror);
+    unit = make_unit_skin(skin, &frame);
+    to_unit();
+    symmetrise(search.mirror, unit_joints);
+    weights = joint_weights(unit, unit_joints, stand_in);
+  }
   weights.excluded = excluded;
-  return {skin, joints, std::move(unit), std::move(unit_joints), std::move(weights), std::move(stand_in)};
+  RigInput input{skin,
+                 joints,
+                 std::move(unit),
+                 std::move(unit_joints),
+                 std::move(weights),
+                 std::move(stand_in),
+                 {},
+                 std::move(search.why_not)};
+  if (search.found) input.mirror = std::move(search.mirror);
+  return input;
 }
 
 }  // namespace sinew::lattice::detail

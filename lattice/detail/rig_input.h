@@ -1,7 +1,12 @@
 #pragma once
 
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "lattice/build.h"
 #include "lattice/detail/skeleton_reduction.h"
+#include "lattice/detail/symmetry.h"
 #include "lattice/detail/unit_skin.h"
 #include "lattice/surface.h"
 
@@ -18,6 +23,11 @@ struct RigInput {
   JointWeights weights;
   /// Per joint the one that its skin weight counts for: itself unless it is excluded.
   std::vector<int> stand_in;
+  /// Found and wanted: unit coordinates have their plane at x = 0, and unit_joints are exact mirror images.
+  std::optional<RigMirror> mirror;
+  std::string no_mirror;  ///< why there is none.
+
+  const std::vector<int>* mirror_joint() const { return mirror ? &mirror->joint : nullptr; }
 };
 
 /// Throws std::invalid_argument where there is no triangle, no joint or no weight, an index does not exist or

@@ -9,14 +9,13 @@
 #include <fmt/format.h>
 
 #include "lattice/detail/segments.h"
+#include "lattice/detail/symmetry.h"
 
 namespace sinew::lattice::detail {
 namespace {
 
 using Eigen::Vector3d;
 
-/// Joints with less than this share of the skin's area count as weightless: stray weights of exporters.
-constexpr double kWeightless = 1e-6;
 /// A joint needs this share of the skin's area for a frame of its own; below, its parent's frame serves it.
 constexpr double kOwnFrame = 1e-4;
 /// A tip bone reaches this share of the way from its joint to its farthest vertex.
@@ -28,8 +27,14 @@ constexpr double kContractedTip = 1.0;
 class Reduction {
  public:
   Reduction(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights, double h,
-            const ReductionOptions& options)
-      : skin_(skin), joints_(joints), weights_(weights), h_(h), options_(options), n_(num_joints()) {
+            const ReductionOptions& options, const std::vector<int>* mirror_joint)
+      : skin_(skin),
+        joints_(joints),
+        weights_(weights),
+        h_(h),
+        options_(options),
+        mirror_joint_(mirror_joint),
+        n_(num_joints()) {
     for (double a : weights_.area) total_area_ += a;
   }
 
@@ -38,9 +43,11 @@ class Reduction {
     place_nodes();
     chain_siblings();
     soften_close_bones();
+    if (mirror_joint_ != nullptr) soften_bones_at_their_image();
     add_tips();
     soften_wanted_bones();
     drop_unused_nodes();
+    if (mirror_joint_ != nullptr) add_mirror_images();
     name_bones();
     return std::move(result_);
   }
@@ -54,6 +61,7 @@ class Reduction {
   double metres(double unit_length) const { return unit_length * skin_.scale; }
   void report(int joint, const char* what, std::string reason) {
     result_.changes.push_back({joints_.names[joint], what, std::move(reason)});
+    changed_joints_.push_back(joint);
   }
 
   void prune();
@@ -63,6 +71,9 @@ class Reduction {
   bool chain_one_pair();
   void soften_close_bones();
   void soften_wanted_bones();
+  void soften_bones_at_their_image();
+  bool is_close_to_image(const Vector3d& a, const Vector3d& b) const;
+  void add_mirror_images();
   void soften(int bone, const std::string& reason);
   bool is_leaf(const ReducedBone& bone) const;
   void add_tips();
@@ -77,10 +88,12 @@ class Reduction {
   const JointWeights& weights_;
   double h_;
   ReductionOptions options_;
+  const std::vector<int>* mirror_joint_;
   int n_;
   double total_area_ = 0.0;
-  std::vector<bool> kept_;    ///< per joint.
-  std::vector<int> node_of_;  ///< per joint; -1 where pruned.
+  std::vector<bool> kept_;           ///< per joint.
+  std::vector<int> node_of_;         ///< per joint; -1 where pruned.
+  std::vector<int> changed_joints_;  ///< of result_.changes.
   ReducedSkeleton result_;
 };
 
@@ -107,6 +120,9 @@ void Reduction::prune() {
     kept_[j] = false;
     report(j, "pruned", "no skin weight on it and only one joint below it");
   }
+  // Of a mirrored rig the other half follows from this one.
+  for (int j = 0; j < n_; ++j)
+    if (mirror_joint_ != nullptr && kept_[j] && position(j).x() < 0.0) kept_[j] = false;
 }
 
 bool Reduction::is_cut(int parent, int child, std::string& reason) const {
@@ -178,6 +194,7 @@ bool Reduction::chain_one_pair() {
   for (std::size_t i = 0; i < result_.bones.size(); ++i)
     for (std::size_t k = i + 1; k < result_.bones.size(); ++k) {
       if (result_.bones[i].start != result_.bones[k].start) continue;
+      if (result_.bones[i].soft || result_.bones[k].soft) continue;
       const bool swap = length(result_.bones[i]) > length(result_.bones[k]);
       const ReducedBone shorter = result_.bones[swap ? k : i];
       ReducedBone& longer = result_.bones[swap ? i : k];
@@ -185,6 +202,16 @@ bool Reduction::chain_one_pair() {
                      v = (end(longer) - start(longer)).normalized();
       const double distance = point_segment_distance(end(shorter), start(longer), end(longer));
       if (u.dot(v) < cosine && distance > options_.too_close * h_) continue;
+      if (mirror_joint_ != nullptr && end(longer).x() == 0.0 && end(shorter).x() != 0.0) {
+        // A bone in the plane of symmetry cannot start at one side.
+        soften(
+            static_cast<int>(swap ? k : i),
+            fmt::format("it leaves '{}' within {:.0f} degrees of the bone to '{}' in the plane of symmetry",
+                        joints_.names[result_.nodes[longer.start].joint],
+                        std::acos(std::min(1.0, u.dot(v))) * 180.0 / std::numbers::pi,
+                        joints_.names[result_.nodes[longer.end].joint]));
+        return true;
+      }
       const int joint = result_.nodes[longer.end].joint;
       report(joint, "chained",
              fmt::format("its bone leaves '{}' within {:.0f} degrees and {:.3g} m of the bone to '{}', so it "
@@ -253,13 +280,77 @@ void Reduction::soften_close_bones() {
 }
 
 void Reduction::soften_wanted_bones() {
+  const auto is = [&](int joint, int wanted) {
+    return joint == wanted || (mirror_joint_ != nullptr && (*mirror_joint_)[joint] == wanted);
+  };
   for (const SoftBone& wanted : options_.soft_bones)
     for (int b = 0; b < static_cast<int>(result_.bones.size()); ++b) {
       const ReducedBone& bone = result_.bones[b];
-      if (!bone.soft && bone.frame == wanted.frame && bone.tip == wanted.tip &&
-          result_.nodes[bone.end].joint == wanted.end_joint)
+      if (!bone.soft && bone.tip == wanted.tip && is(bone.frame, wanted.frame) &&
+          is(result_.nodes[bone.end].joint, wanted.end_joint))
         soften(b, wanted.reason);
     }
+}
+
+/// True where a bone of the half x >= 0 is too close to its own mirror image for both to be edges: cells
+/// between it and the plane would be flat.
+bool Reduction::is_close_to_image(const Vector3d& a, const Vector3d& b) const {
+  if (a.x() == 0.0 && b.x() == 0.0) return false;
+  const double limit = options_.too_close * h_;
+  if (a.x() != 0.0) return std::min(a.x(), b.x()) < limit;
+  const double to_plane = std::asin((b - a).normalized().x()) * 180.0 / std::numbers::pi;
+  return b.x() < limit || 2.0 * to_plane < options_.chain_degrees;
+}
+
+void Reduction::soften_bones_at_their_image() {
+  for (int b = 0; b < static_cast<int>(result_.bones.size()); ++b) {
+    const ReducedBone& bone = result_.bones[b];
+    if (bone.soft || !is_close_to_image(start(bone), end(bone))) continue;
+    soften(b, fmt::format("its bone to '{}' comes within {:.3g} m of its mirror image",
+                          joints_.names[result_.nodes[bone.end].joint],
+                          2.0 * metres(start(bone).x() == 0.0 ? end(bone).x()
+                                                              : std::min(start(bone).x(), end(bone).x()))));
+  }
+}
+
+/// The half x < 0 from the other one.
+void Reduction::add_mirror_images() {
+  const std::vector<int>& partner = *mirror_joint_;
+  std::vector<int> image(result_.nodes.size());
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const SkeletonNode node = result_.nodes[i];
+    image[i] = static_cast<int>(i);
+    if (node.position.x() == 0.0) continue;
+    image[i] = static_cast<int>(result_.nodes.size());
+    result_.nodes.push_back({partner[node.joint], reflected(node.position)});
+  }
+  const std::size_t count = result_.bones.size();
+  result_.mirror_bone.resize(count);
+  for (std::size_t b = 0; b < count; ++b) {
+    ReducedBone bone = result_.bones[b];
+    result_.mirror_bone[b] = static_cast<int>(b);
+    if (image[bone.start] == bone.start && image[bone.end] == bone.end) continue;
+    bone.frame = partner[bone.frame];
+    bone.start = image[bone.start];
+    bone.end = image[bone.end];
+    result_.mirror_bone[b] = static_cast<int>(result_.bones.size());
+    result_.mirror_bone.push_back(static_cast<int>(b));
+    result_.bones.push_back(bone);
+  }
+  const std::size_t frames = result_.soft_frames.size();
+  for (std::size_t i = 0; i < frames; ++i) {
+    const SoftFrame frame = result_.soft_frames[i];
+    if (partner[frame.frame] != frame.frame)
+      result_.soft_frames.push_back({partner[frame.frame], reflected(frame.position)});
+  }
+  const std::size_t changes = result_.changes.size();
+  for (std::size_t i = 0; i < changes; ++i) {
+    const int other = partner[changed_joints_[i]];
+    if (other < 0 || other == changed_joints_[i]) continue;
+    const SkeletonChange& change = result_.changes[i];
+    result_.changes.push_back({joints_.names[other], change.what,
+                               fmt::format("like its mirror image '{}': {}", change.joint, change.reason)});
+  }
 }
 
 /// Why no bone from a (at `node`) to b can be added; empty where it can.
@@ -297,7 +388,9 @@ bool Reduction::add_tip(int joint, double smallest, const std::vector<double>& v
     area += w;
   }
   if (!(area > 0.0)) return false;
-  const Vector3d toward = centroid / area - from;
+  Vector3d toward = centroid / area - from;
+  const bool in_plane = mirror_joint_ != nullptr && (*mirror_joint_)[joint] == joint;
+  if (in_plane) toward.x() = 0.0;
   if (toward.norm() < 0.05 * h_) return false;  // no direction to speak of
   const Vector3d direction = toward.normalized();
   double reach = 0.0;
@@ -315,6 +408,7 @@ bool Reduction::add_tip(int joint, double smallest, const std::vector<double>& v
   if (tip_length < smallest * h_) return false;
   const Vector3d tip = from + tip_length * direction;
   if (!conflict(from, tip, node).empty()) return false;
+  if (mirror_joint_ != nullptr && is_close_to_image(from, tip)) return false;
 
   ReducedBone bone;
   bone.frame = joint;
@@ -378,6 +472,7 @@ void Reduction::add_tips() {
         SoftFrame frame;
         frame.frame = carrier;
         frame.position = soft_position(j, vertex_weight);
+        if (mirror_joint_ != nullptr && (*mirror_joint_)[carrier] == carrier) frame.position.x() = 0.0;
         result_.soft_frames.push_back(frame);
         report(carrier, "soft frame",
                fmt::format("carries {:.2g} % of the skin but {}", 100.0 * area / total_area_,
@@ -451,8 +546,9 @@ JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints, const 
 }
 
 ReducedSkeleton reduce_skeleton(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights,
-                                double h, const ReductionOptions& options) {
-  return Reduction(skin, joints, weights, h, options).run();
+                                double h, const ReductionOptions& options,
+                                const std::vector<int>* mirror_joint) {
+  return Reduction(skin, joints, weights, h, options, mirror_joint).run();
 }
 
 std::vector<int> frame_of_joint(const std::vector<int>& parents, const std::vector<int>& frames) {

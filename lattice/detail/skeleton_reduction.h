@@ -17,6 +17,9 @@ struct SoftBone {
   std::string reason;  ///< for the report.
 };
 
+/// Joints with less than this share of the skin's area count as weightless: stray weights of exporters.
+inline constexpr double kWeightless = 1e-6;
+
 /// Thresholds of the reduction; lengths in units of h.
 struct ReductionOptions {
   double smallest_bone = 0.5;  ///< shorter bones are contracted.
@@ -52,6 +55,9 @@ struct ReducedSkeleton {
   std::vector<ReducedBone> bones;
   std::vector<SoftFrame> soft_frames;  ///< positions in unit coordinates.
   std::vector<SkeletonChange> changes;
+  /// Per bone its mirror image in x = 0, itself in the plane; empty where the rig is not symmetric. Nodes of
+  /// partners are exact mirror images.
+  std::vector<int> mirror_bone;
 };
 
 /// How the skin hangs on the joints; independent of h.
@@ -65,9 +71,12 @@ struct JointWeights {
 /// `stand_in` says for every joint which one its weight counts for.
 JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints, const std::vector<int>& stand_in);
 
-/// Reduces the joint tree at target edge `h` (unit coordinates, like the positions of `joints`).
+/// Reduces the joint tree at target edge `h` (unit coordinates, like the positions of `joints`). With
+/// `mirror_joint` (per joint its exact mirror image in x = 0, -1 for joints without skin) only the half x >=
+/// 0 is reduced and then mirrored; bones too close to their own image become soft.
 ReducedSkeleton reduce_skeleton(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights,
-                                double h, const ReductionOptions& options);
+                                double h, const ReductionOptions& options,
+                                const std::vector<int>* mirror_joint = nullptr);
 
 /// For every joint the frame its weight counts for: itself if it owns a bone or a soft frame, else the
 /// nearest ancestor that does, else the nearest descendant, else the first frame there is; -1 where there is

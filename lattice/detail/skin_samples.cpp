@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lattice/detail/symmetry.h"
+
 namespace sinew::lattice::detail {
 namespace {
 
@@ -27,7 +29,8 @@ void sample_inside(const UnitSkin& skin, double voxel, std::vector<Vector3d>& ou
 
 }  // namespace
 
-SkinSamples sample_skin(const UnitSkin& skin, double h) {
+SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves) {
+  const bool fold = halves == Halves::OneMirrored;
   std::vector<Vector3d> points;
   for (int v = 0; v < skin.points.rows(); ++v) {
     const Vector3d p = skin.points.row(v);
@@ -39,6 +42,19 @@ SkinSamples sample_skin(const UnitSkin& skin, double h) {
   for (int t = 0; t < skin.triangles.rows(); ++t)
     triangles.push_back({skin.points.row(skin.triangles(t, 0)), skin.points.row(skin.triangles(t, 1)),
                          skin.points.row(skin.triangles(t, 2))});
+  if (fold) {
+    for (Vector3d& p : points)
+      if (p.x() < 0.0) p = reflected(p);
+    // Partners may be cut along other diagonals: every triangle counts on both sides.
+    std::vector<TriangleCorners> kept;
+    for (const TriangleCorners& t : triangles) {
+      const double low = std::min({t[0].x(), t[1].x(), t[2].x()}),
+                   high = std::max({t[0].x(), t[1].x(), t[2].x()});
+      if (high > 0.0) kept.push_back(t);
+      if (low < 0.0) kept.push_back({reflected(t[0]), reflected(t[1]), reflected(t[2])});
+    }
+    triangles = std::move(kept);
+  }
   return {std::move(points), TriangleGrid(std::move(triangles), kGridSide * h)};
 }
 

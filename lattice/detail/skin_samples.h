@@ -16,7 +16,11 @@ struct SkinSamples {
   TriangleGrid triangles;
 };
 
-/// Samples for target edge `h` (unit coordinates).
-SkinSamples sample_skin(const UnitSkin& skin, double h);
+/// Whether a lattice has two halves, of which one is built.
+enum class Halves { Both, OneMirrored };
+
+/// Samples for target edge `h` (unit coordinates). With OneMirrored, those with x < 0 are mirrored to the
+/// other side.
+SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves);
 
 }  // namespace sinew::lattice::detail

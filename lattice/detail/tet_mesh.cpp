@@ -122,8 +122,8 @@ bool tetrahedron_contains(const Vector3d& a, const Vector3d& b, const Vector3d& 
   return wb >= limit && wc >= limit && wd >= limit && volume - wb - wc - wd >= limit;
 }
 
-TetMesh::TetMesh(std::vector<Vector3d> start, const std::vector<Tet>& tets)
-    : points(std::move(start)), stars_(points.size()) {
+TetMesh::TetMesh(std::vector<Vector3d> start, const std::vector<Tet>& tets, Half half)
+    : points(std::move(start)), half_(half), stars_(points.size()) {
   for (const Tet& t : tets) add(t);
 }
 
@@ -167,7 +167,8 @@ std::vector<std::vector<std::array<int, 2>>> TetMesh::boundary_faces() const {
   std::vector<std::vector<std::array<int, 2>>> result(points.size());
   for (std::size_t i = 0; i < faces.size();) {
     const bool paired = i + 1 < faces.size() && faces[i] == faces[i + 1];
-    if (!paired)
+    const bool in_plane = is_in_plane(faces[i][0]) && is_in_plane(faces[i][1]) && is_in_plane(faces[i][2]);
+    if (!paired && !in_plane)
       for (int k = 0; k < 3; ++k)
         result[faces[i][k]].push_back({faces[i][(k + 1) % 3], faces[i][(k + 2) % 3]});
     i += paired ? 2 : 1;
@@ -197,7 +198,13 @@ TetMesh::Ring TetMesh::ring(int a, int b) const {
   }
   Ring ring;
   if (sides.empty()) return ring;
-  int current = sides[0].from;
+  const auto is_end = [&](int vertex) {
+    return std::any_of(sides.begin(), sides.end(), [&](const Side& side) { return side.to == vertex; });
+  };
+  const auto first = std::find_if(sides.begin(), sides.end(), [&](const Side& s) { return !is_end(s.from); });
+  const bool open = first != sides.end();
+  const int begin = open ? first->from : sides[0].from;
+  int current = begin;
   for (std::size_t i = 0; i < sides.size(); ++i) {
     const auto next =
         std::find_if(sides.begin(), sides.end(), [&](const Side& side) { return side.from == current; });
@@ -205,10 +212,12 @@ TetMesh::Ring TetMesh::ring(int a, int b) const {
     ring.cells.push_back(next->cell);
     ring.rim.push_back(current);
     current = next->to;
-    if (current == sides[0].from && i + 1 < sides.size()) return {};
+    if (current == begin && i + 1 < sides.size()) return {};
   }
-  if (current != sides[0].from) return {};
-  return ring;
+  if (!open) return current == begin ? ring : Ring{};
+  ring.rim.push_back(current);
+  const bool in_plane = is_in_plane(a) && is_in_plane(b) && is_in_plane(begin) && is_in_plane(current);
+  return in_plane ? ring : Ring{};
 }
 
 bool remove_edge(TetMesh& mesh, int a, int b, const EdgeSet& keep) {

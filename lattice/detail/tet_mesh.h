@@ -28,10 +28,13 @@ class TetMesh {
  public:
   using Tet = std::array<int, 4>;
 
-  TetMesh(std::vector<Eigen::Vector3d> points, const std::vector<Tet>& tets);
+  /// With Half::PositiveX the mesh is one half of a mirrored one: faces in x = 0 are not on its boundary.
+  enum class Half { No, PositiveX };
+  TetMesh(std::vector<Eigen::Vector3d> points, const std::vector<Tet>& tets, Half half = Half::No);
 
   std::vector<Eigen::Vector3d> points;
 
+  bool is_in_plane(int vertex) const { return half_ == Half::PositiveX && points[vertex].x() == 0.0; }
   int num_slots() const { return static_cast<int>(tets_.size()); }
   bool is_alive(int t) const { return alive_[t]; }
   const Tet& tet(int t) const { return tets_[t]; }
@@ -52,7 +55,8 @@ class TetMesh {
   std::vector<std::vector<std::array<int, 2>>> boundary_faces() const;
 
   /// The cells round the edge a-b in cyclic order with their rim, counter-clockwise seen from b; empty where
-  /// the edge lies on the boundary. Cell i holds rim vertices i and i + 1.
+  /// the edge lies on the boundary. Cell i holds rim vertices i and i + 1. Round an edge in the plane of a
+  /// half the rim is open, from one vertex in the plane to another.
   struct Ring {
     std::vector<int> cells;
     std::vector<int> rim;
@@ -60,6 +64,7 @@ class TetMesh {
   Ring ring(int a, int b) const;
 
  private:
+  Half half_;
   std::vector<Tet> tets_;
   std::vector<char> alive_;
   std::vector<std::vector<int>> stars_;

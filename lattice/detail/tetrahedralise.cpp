@@ -50,6 +50,18 @@ struct Triangulation {
   }
 };
 
+/// True where a vertex in the plane of a half has a face on the hull that is not in the plane.
+bool on_rim(const LatticePoints& points, const Delaunay& delaunay, const Delaunay::Vertex_handle& vertex) {
+  std::vector<Delaunay::Cell_handle> cells;
+  delaunay.incident_cells(vertex, std::back_inserter(cells));
+  return std::any_of(cells.begin(), cells.end(), [&](const Delaunay::Cell_handle& cell) {
+    if (!delaunay.is_infinite(cell)) return false;
+    for (int k = 0; k < 4; ++k)
+      if (!delaunay.is_infinite(cell->vertex(k)) && !points.is_in_plane(cell->vertex(k)->info())) return true;
+    return false;
+  });
+}
+
 /// Moves free points near the bones half-way to the mean of their neighbours, so that the grid gives way.
 void relax(LatticePoints& points, const Triangulation& triangulation, double h, const PointOptions& options) {
   const BoneClearance clearance(points, h, options);
@@ -59,15 +71,25 @@ void relax(LatticePoints& points, const Triangulation& triangulation, double h, 
   for (std::size_t i = 0; i < points.points.size(); ++i) {
     const LatticePoints::Place& place = points.places[i];
     if (place.fixed || place.bone >= 0 || clearance.distance(points.points[i]) > kRelaxReach * h) continue;
+    const bool in_plane = points.is_in_plane(static_cast<int>(i));
     neighbours.clear();
     delaunay.adjacent_vertices(triangulation.handles[i], std::back_inserter(neighbours));
-    Vector3d mean = Vector3d::Zero();
+    Vector3d sum = Vector3d::Zero();
+    double count = 0.0;
     bool on_hull = false;
     for (const Delaunay::Vertex_handle& v : neighbours) {
-      on_hull = on_hull || delaunay.is_infinite(v);
-      if (!on_hull) mean += points.points[v->info()] / static_cast<double>(neighbours.size());
+      if (delaunay.is_infinite(v)) {
+        on_hull = true;
+        continue;
+      }
+      // A neighbour of a vertex in the plane counts for its mirror image too.
+      const double times = in_plane && !points.is_in_plane(v->info()) ? 2.0 : 1.0;
+      sum += times * points.points[v->info()];
+      count += times;
     }
-    if (on_hull) continue;
+    if (in_plane ? on_rim(points, delaunay, triangulation.handles[i]) : on_hull) continue;
+    Vector3d mean = sum / count;
+    if (in_plane) mean.x() = 0.0;
     const Vector3d target = 0.5 * (points.points[i] + mean);
     if (!clearance.is_too_close(target)) moved[i] = target;
   }
@@ -134,6 +156,8 @@ Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const
   Delaunay::Cell_handle hint;
   for (const Vector3d& p : samples.points) {
     hint = delaunay.locate(to_cgal(p), hint);
+    // A point on the hull, as in the plane of a half, may be found outside.
+    if (delaunay.is_infinite(hint)) hint = hint->neighbor(hint->index(delaunay.infinite_vertex()));
     hint->info() = true;
   }
   for (const std::vector<int>& chain : points.chains)

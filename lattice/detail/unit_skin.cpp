@@ -182,13 +182,14 @@ void check(const Surface& skin) {
 
 }  // namespace
 
-UnitSkin make_unit_skin(const Surface& skin) {
+UnitSkin make_unit_skin(const Surface& skin, const MirrorFrame* frame) {
   check(skin);
   const Vector3d low = skin.points.colwise().minCoeff(), high = skin.points.colwise().maxCoeff();
-  const Vector3d centre = 0.5 * (low + high);
+  const Vector3d centre = frame != nullptr ? frame->origin : Vector3d(0.5 * (low + high));
+  const Eigen::Matrix3d axes = frame != nullptr ? frame->axes : Eigen::Matrix3d::Identity();
   const double scale = (high - low).maxCoeff();
   if (!(scale > 0.0)) throw std::invalid_argument("lattice: all skin vertices are one point");
-  const Points unit = (skin.points.rowwise() - centre.transpose()) / scale;
+  const Points unit = (skin.points.rowwise() - centre.transpose()) * axes.transpose() / scale;
 
   const std::vector<int> order = canonical_order(unit, skin.weights);
   const std::vector<int> representative = weld(unit(order, Eigen::all));
@@ -226,6 +227,7 @@ UnitSkin make_unit_skin(const Surface& skin) {
   for (Vector3d& n : normals) n.stableNormalize();
   SurfaceQuery query(points, triangles);
   return {centre,
+          axes,
           scale,
           points,
           triangles,
