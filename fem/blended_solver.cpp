@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <tbb/blocked_range.h>
@@ -12,6 +13,7 @@
 
 #include "fem/detail/coordinates.h"
 #include "fem/detail/couples.h"
+#include "fem/growth.h"
 
 namespace sinew::fem {
 namespace {
@@ -312,6 +314,36 @@ Factor::Report BlendedSolver::prepare(double h, Integrator integrator) {
   return done;
 }
 
+namespace {
+
+/// The shape free of strain at one instant: at rest, or grown with joints that the clip scales.
+struct Rest {
+  std::optional<Growth> growth;
+  Points coefficients;  ///< of the grown shape.
+
+  Rest() = default;
+  Rest(const Body& body, const Coordinates& coordinates, const PosedFrames& posed) {
+    if (!body.grows) return;
+    growth = fem::growth(body, posed);
+    coordinates.analyse(growth->shape, coefficients);
+  }
+
+  /// A function's coefficient, positions relative to the region's origin.
+  Eigen::Vector3d of(const Body& body, const Coordinates& coordinates, const Region& region,
+                     int function) const {
+    const double is_value = coordinates.is_value[static_cast<std::size_t>(function)] ? 1.0 : 0.0;
+    if (!growth) {
+      const int vertex = coordinates.vertex[static_cast<std::size_t>(function)];
+      return is_value * (body.mesh.points.row(vertex).transpose() - region.origin_rest);
+    }
+    const Frame& frame = body.tree.frames[static_cast<std::size_t>(region.second)];
+    return coefficients.row(function).transpose() -
+           is_value * growth->of(region.second, frame, region.origin_rest);
+  }
+};
+
+}  // namespace
+
 /// What all regions of one stage share.
 struct BlendedSolver::Impl::StepData {
   const State* state;
@@ -321,6 +353,7 @@ struct BlendedSolver::Impl::StepData {
   Eigen::Vector3d gravity;
   bool use_past;
   Points x_h, v_h, x_known, v_known, x_now, x_past;  ///< coefficients.
+  Rest rest_end, rest_now, rest_past;
 };
 
 namespace {
@@ -354,20 +387,19 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
     const bool known = static_cast<int>(k) >= s.num_unknown;
     // A detail is a difference of positions: it turns with the region but does not travel.
     const double is_value = coordinates.is_value[static_cast<std::size_t>(f)] ? 1.0 : 0.0;
-    const Eigen::Vector3d rest =
-        is_value * (body->mesh.points.row(coordinates.vertex[static_cast<std::size_t>(f)]).transpose() -
-                    region.origin_rest);
+    const auto rest_of = [&](const Rest& rest) { return rest.of(*body, coordinates, region, f); };
     const Eigen::Vector3d x_now = step.x_now.row(f).transpose();
     const Eigen::Vector3d x_stage = (known ? step.x_known : step.x_h).row(f).transpose();
     const Eigen::Vector3d p = to_local * (x_stage - is_value * end.origin);
-    const Eigen::Vector3d u_end = p - rest;
-    Eigen::Vector3d u_past = now_local * (x_now - is_value * now.origin) - rest;
+    const Eigen::Vector3d u_end = p - rest_of(step.rest_end);
+    Eigen::Vector3d u_past = now_local * (x_now - is_value * now.origin) - rest_of(step.rest_now);
     Eigen::Vector3d carried = carry(from_now, x_now, is_value);
     if (step.use_past) {
       const Eigen::Vector3d x_past = step.x_past.row(f).transpose();
-      const Eigen::Vector3d u_before = past_local * (x_past - is_value * past.origin) - rest;
-      u_past = (4.0 * u_past - u_before) / 3.0;
-      carried = (4.0 * carried - carry(from_past, x_past, is_value)) / 3.0;
+      const Eigen::Vector3d u_before =
+          past_local * (x_past - is_value * past.origin) - rest_of(step.rest_past);
+      u_past += step.stage.look_back * (u_past - u_before);
+      carried += step.stage.look_back * (carried - carry(from_past, x_past, is_value));
     }
     // v+ - v_frame is the integrator's own difference of the flesh's place in the region: as exact as its
     // step.
@@ -415,7 +447,7 @@ void BlendedSolver::Impl::solve_region(RegionSystem& s, const StepData& step, co
   }
   for (const auto& [t, rows] : s.ties) {
     const Tie& tie = body->ties[static_cast<std::size_t>(t)];
-    const Eigen::Affine3d& target = step.poses.stage->frames[static_cast<std::size_t>(tie.frame)].from_rest;
+    const Eigen::Affine3d target = tie_target(*body, tie, *step.poses.stage);
     const Eigen::Matrix3d turn = to_local * target.linear();
     const Eigen::Vector3d centre = to_local * (target * tie.centre_rest - end.origin);
     for (const auto& [k, r] : rows) {
@@ -499,8 +531,8 @@ lattice::Points BlendedSolver::stage_velocity(const State& state, const Points& 
   step.gravity = gravity;
   step.use_past = use_past;
   const double eta_h = step.stage.eta * h;
-  // A start's stage lies at t + eta h, a regular one at t + h.
-  const double elapsed = use_past ? h : eta_h;
+  // A start's stage lies at t + eta h.
+  const double elapsed = use_past ? step.stage.reach * h : eta_h;
   const Points v_known = known_velocity(body, state, x_h, poses, elapsed, eta_h, impl_->systems.size() > 1);
   const Points x_known = x_h + eta_h * v_known;
   const Coordinates& coordinates = impl_->coordinates;
@@ -510,6 +542,10 @@ lattice::Points BlendedSolver::stage_velocity(const State& state, const Points& 
   coordinates.analyse(v_known, step.v_known);
   coordinates.analyse(state.x, step.x_now);
   if (use_past) coordinates.analyse(state.x_past, step.x_past);
+
+  step.rest_end = Rest(body, coordinates, *poses.stage);
+  step.rest_now = Rest(body, coordinates, *poses.now);
+  if (use_past) step.rest_past = Rest(body, coordinates, *poses.before);
 
   const std::vector<Factor>& factors = impl_->factors.at({h, integrator});
   std::vector<RegionSystem>& systems = impl_->systems;

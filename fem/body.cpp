@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "fem/growth.h"
+
 namespace sinew::fem {
 namespace {
 
@@ -224,9 +226,12 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
             std::move(ties),
             std::move(regions),
             options.damping,
+            std::any_of(posed.begin(), posed.end(), scales_joints),
+            {},
             {},
             0.0,
             0.0};
+  if (body.grows) body.bone_extension = bone_extension(body.hierarchy, body.mesh, body.bones);
   body.vertex_mass.assign(static_cast<std::size_t>(body.mesh.num_vertices()), 0.0);
   for (int a = 0; a < body.mesh.num_vertices(); ++a) {
     for (int e = body.matrices.row_start[static_cast<std::size_t>(a)];

@@ -49,6 +49,9 @@ struct Body {
   std::vector<Tie> ties;
   std::vector<Region> regions;
   Damping damping;
+  /// Some pose of the clip scales a joint: judged once, so that nothing jumps where a scale passes through 1.
+  bool grows = false;
+  FrameWeights bone_extension;      ///< of leaf vertices; empty where nothing grows.
   std::vector<double> vertex_mass;  ///< row sums of M [kg].
   double volume = 0.0;              ///< of the flesh [m^3].
   double size = 0.0;                ///< diagonal of the lattice's box [m].

@@ -39,6 +39,38 @@ int nearest_frame(const FrameTree& tree, const Eigen::Vector3d& p) {
   return nearest;
 }
 
+/// Solves (L + D) s = rhs with L the graph Laplacian of `edges`; fixed rows keep their values.
+Eigen::MatrixXd solve_laplacian(const std::set<std::pair<int, int>>& edges, const Eigen::VectorXd& d,
+                                Eigen::MatrixXd rhs, const std::vector<std::uint8_t>& is_fixed,
+                                const Eigen::MatrixXd& fixed) {
+  const int num_rows = static_cast<int>(d.size());
+  std::vector<Eigen::Triplet<double>> triplets;
+  Eigen::VectorXd diagonal = d;
+  const auto couple = [&](int a, int b) {
+    if (is_fixed[static_cast<std::size_t>(a)]) return;
+    diagonal[a] += 1.0;
+    if (is_fixed[static_cast<std::size_t>(b)]) {
+      rhs.row(a) += fixed.row(b);
+    } else {
+      triplets.emplace_back(a, b, -1.0);
+    }
+  };
+  for (const auto& [a, b] : edges) {
+    couple(a, b);
+    couple(b, a);
+  }
+  for (int a = 0; a < num_rows; ++a) {
+    const bool known = is_fixed[static_cast<std::size_t>(a)] != 0;
+    triplets.emplace_back(a, a, known ? 1.0 : diagonal[a]);
+    if (known) rhs.row(a) = fixed.row(a);
+  }
+  Eigen::SparseMatrix<double> matrix(num_rows, num_rows);
+  matrix.setFromTriplets(triplets.begin(), triplets.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
+  if (factor.info() != Eigen::Success) throw std::runtime_error("frame_weights: the M-matrix did not factor");
+  return factor.solve(rhs);
+}
+
 /// Coarse weights, num_coarse x num_frames, dense: a few hundred rows.
 Eigen::MatrixXd solve_coarse(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
                              const lattice::Embedding& skin, const lattice::Surface& surface,
@@ -78,54 +110,31 @@ Eigen::MatrixXd solve_coarse(const lattice::Hierarchy& hierarchy, const lattice:
     fixed(bone.vertex, bone.frame) += bone.second_frame >= 0 ? 0.5 : 1.0;
     if (bone.second_frame >= 0) fixed(bone.vertex, bone.second_frame) += 0.5;
   }
-  std::vector<Eigen::Triplet<double>> triplets;
-  Eigen::VectorXd diagonal = d;
-  const auto couple = [&](int a, int b) {
-    if (is_fixed[static_cast<std::size_t>(a)]) return;
-    diagonal[a] += 1.0;
-    if (is_fixed[static_cast<std::size_t>(b)]) {
-      rhs.row(a) += fixed.row(b);
-    } else {
-      triplets.emplace_back(a, b, -1.0);
-    }
-  };
-  for (const auto& [a, b] : coarse_edges(hierarchy, mesh)) {
-    couple(a, b);
-    couple(b, a);
-  }
-  for (int a = 0; a < num_coarse; ++a) {
-    const bool known = is_fixed[static_cast<std::size_t>(a)] != 0;
-    triplets.emplace_back(a, a, known ? 1.0 : diagonal[a]);
-    if (known) rhs.row(a) = fixed.row(a);
-  }
-  Eigen::SparseMatrix<double> matrix(num_coarse, num_coarse);
-  matrix.setFromTriplets(triplets.begin(), triplets.end());
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
-  if (factor.info() != Eigen::Success) throw std::runtime_error("frame_weights: the M-matrix did not factor");
-  return factor.solve(rhs);
+  return solve_laplacian(coarse_edges(hierarchy, mesh), d, rhs, is_fixed, fixed);
 }
 
-}  // namespace
-
-FrameWeights frame_weights(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
-                           const lattice::Embedding& skin, const lattice::Surface& surface,
-                           const FrameTree& tree, const BoneConstraints& bones) {
-  constexpr double kSmallest = 1e-3;
-  const int num_coarse = static_cast<int>(
+int num_coarse_vertices(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh) {
+  return static_cast<int>(
       std::lower_bound(mesh.vertices.begin(), mesh.vertices.end(), hierarchy.num_vertices(0)) -
       mesh.vertices.begin());
-  const Eigen::MatrixXd coarse = solve_coarse(hierarchy, mesh, skin, surface, tree, bones, num_coarse);
-  FrameWeights coarse_sparse(num_coarse, tree.num_frames());
+}
+
+/// Weights of all leaf vertices from those of level 0: small ones dropped, rows normalised, and means of
+/// parents all the way down, the level-0 columns of the value rows with every detail at zero.
+FrameWeights prolonged(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
+                       const Eigen::MatrixXd& coarse) {
+  constexpr double kSmallest = 1e-3;
+  const auto num_coarse = static_cast<int>(coarse.rows());
+  FrameWeights coarse_sparse(num_coarse, coarse.cols());
   std::vector<Eigen::Triplet<double>> triplets;
   for (int a = 0; a < num_coarse; ++a) {
     const Eigen::RowVectorXd row = coarse.row(a).cwiseMax(0.0);
     const Eigen::RowVectorXd kept = (row.array() < kSmallest * row.sum()).select(0.0, row);
-    for (int f = 0; f < tree.num_frames(); ++f) {
+    for (int f = 0; f < coarse.cols(); ++f) {
       if (kept[f] > 0.0) triplets.emplace_back(a, f, kept[f] / kept.sum());
     }
   }
   coarse_sparse.setFromTriplets(triplets.begin(), triplets.end());
-  // Means of parents all the way down: the level-0 columns of the value rows with every detail at zero.
   std::vector<std::vector<std::pair<int, double>>> rows(static_cast<std::size_t>(mesh.num_vertices()));
   for (int a = 0; a < num_coarse; ++a) rows[static_cast<std::size_t>(a)] = {{a, 1.0}};
   std::vector<Eigen::Triplet<double>> prolongation;
@@ -152,6 +161,35 @@ FrameWeights frame_weights(const lattice::Hierarchy& hierarchy, const lattice::L
   Eigen::SparseMatrix<double, Eigen::RowMajor> from_coarse(mesh.num_vertices(), num_coarse);
   from_coarse.setFromTriplets(prolongation.begin(), prolongation.end());
   return from_coarse * coarse_sparse;
+}
+
+}  // namespace
+
+FrameWeights frame_weights(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
+                           const lattice::Embedding& skin, const lattice::Surface& surface,
+                           const FrameTree& tree, const BoneConstraints& bones) {
+  return prolonged(
+      hierarchy, mesh,
+      solve_coarse(hierarchy, mesh, skin, surface, tree, bones, num_coarse_vertices(hierarchy, mesh)));
+}
+
+FrameWeights bone_extension(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
+                            const BoneConstraints& bones) {
+  const int num_coarse = num_coarse_vertices(hierarchy, mesh);
+  const auto num_bones = static_cast<Eigen::Index>(bones.vertices.size());
+  // Where no bone reaches the weights are zero: a whisper keeps the matrix regular.
+  const Eigen::VectorXd whisper = Eigen::VectorXd::Constant(num_coarse, 1e-9);
+  Eigen::MatrixXd fixed = Eigen::MatrixXd::Zero(num_coarse, num_bones);
+  std::vector<std::uint8_t> is_fixed(static_cast<std::size_t>(num_coarse), 0);
+  for (Eigen::Index k = 0; k < num_bones; ++k) {
+    const int vertex = bones.vertices[static_cast<std::size_t>(k)].vertex;
+    if (vertex >= num_coarse) continue;
+    is_fixed[static_cast<std::size_t>(vertex)] = 1;
+    fixed(vertex, k) = 1.0;
+  }
+  return prolonged(hierarchy, mesh,
+                   solve_laplacian(coarse_edges(hierarchy, mesh), whisper,
+                                   Eigen::MatrixXd::Zero(num_coarse, num_bones), is_fixed, fixed));
 }
 
 std::vector<int> dominant_frames(const FrameWeights& weights) {

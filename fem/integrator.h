@@ -9,20 +9,44 @@
 namespace sinew::fem {
 
 enum class Integrator {
-  Bdf2,           ///< second order, damps little; the default.
-  BackwardEuler,  ///< first order, damps much; cannot fail.
+  Bdf2,              ///< second order, damps little; the default.
+  BackwardEuler,     ///< first order, damps much; cannot fail.
+  TrBdf2,            ///< second order, two stages with one matrix: twice the price, a tenth of BDF2's error.
+  ImplicitMidpoint,  ///< second order, keeps the energy of a linear body; rings after a jolt.
 };
 
 struct Stage {
   double eta = 1.0;
   double theta = 1.0;
   double kappa = 1.0;
+  /// Histories of two states are xh = x + look_back (x - x-), each in the frame of its own time.
+  double look_back = 0.0;
+  /// From the later of the two to the stage [steps].
+  double reach = 1.0;
 };
 
-/// The coefficients of an integrator's stage; BDF2's start and restart use the same ones, hence the same
-/// factor.
+/// Where TR-BDF2 breaks its step, 2 - sqrt(2): both stages then have the same eta and theta, hence one factor
+/// ([Bank85, sec. 3]). The first is the implicit midpoint rule over gamma h, which for linear bodies is the
+/// trapezoidal rule: the state behind it needs no forces.
+inline constexpr double kTrBdf2Break = 0.58578643762690495;
+
+/// The coefficients of an integrator's stage. A start, and the whole of the implicit midpoint rule, is one
+/// stage without history to t + theta h, then extrapolated to the end of the step: the same coefficients,
+/// hence the same factor.
 constexpr Stage stage_of(Integrator integrator) {
-  return integrator == Integrator::Bdf2 ? Stage{2.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0} : Stage{};
+  constexpr double kRest = 1.0 - kTrBdf2Break;
+  switch (integrator) {
+    case Integrator::Bdf2:
+      return {2.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0, 1.0};
+    case Integrator::TrBdf2:
+      return {kTrBdf2Break / 2.0, kTrBdf2Break / 2.0, kTrBdf2Break / 2.0,
+              kRest * kRest / (kTrBdf2Break * (2.0 - kTrBdf2Break)), kRest};
+    case Integrator::ImplicitMidpoint:
+      return {0.5, 0.5, 0.5, 0.0, 1.0};
+    case Integrator::BackwardEuler:
+      break;
+  }
+  return {};
 }
 
 /// Factors of M, K and P in A for a step h [s] with damping alpha [1/s], beta [s].

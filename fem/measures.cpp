@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
+
+#include "fem/growth.h"
 
 namespace sinew::fem {
 namespace {
@@ -32,7 +35,7 @@ double stretch_strain(const Eigen::Matrix3d& gradient) {
 /// Elastic energy by the formula behind cell_stiffness, from the gradients themselves: the linear strain of
 /// R^T F at the Gauss points, with the mean dilatation.
 CellMeasure measure_cell(const Body& body, std::size_t c, const lattice::Points& x,
-                         const Eigen::Matrix3d& rotation) {
+                         const Eigen::Matrix3d& rotation, const lattice::Points* grown) {
   CellMeasure out;
   const lattice::HexCorners rest = lattice::hex_corners(body.mesh.points, body.mesh.cells[c]);
   const lattice::HexCorners posed = lattice::hex_corners(x, body.mesh.cells[c]);
@@ -41,13 +44,20 @@ CellMeasure measure_cell(const Body& body, std::size_t c, const lattice::Points&
   for (int q = 0; q < 8; ++q) {
     const lattice::HexGradients gradients = lattice::trilinear_gradients(gauss_point(q));
     const Eigen::Matrix3d rest_jacobian = rest.transpose() * gradients;
-    const Eigen::Matrix3d gradient = posed.transpose() * gradients * rest_jacobian.inverse();  // F
+    const Eigen::Matrix3d from_rest = posed.transpose() * gradients * rest_jacobian.inverse();
+    Eigen::Matrix3d growth = Eigen::Matrix3d::Identity(),
+                    gradient = from_rest;  // F, from what is free of strain
+    if (grown != nullptr) {
+      growth =
+          lattice::hex_corners(*grown, body.mesh.cells[c]).transpose() * gradients * rest_jacobian.inverse();
+      gradient = from_rest * growth.inverse();
+    }
     out.det = std::min(out.det, gradient.determinant());
     const double fill = body.fill[c][static_cast<std::size_t>(q)];
     if (fill >= 0.5)
       out.strain = std::max(out.strain, stretch_strain(gradient));  // else hardly any flesh to strain
-    const Eigen::Matrix3d turned = rotation.transpose() * gradient;
-    const Eigen::Matrix3d strain = 0.5 * (turned + turned.transpose()) - Eigen::Matrix3d::Identity();
+    const Eigen::Matrix3d turned = rotation.transpose() * from_rest;
+    const Eigen::Matrix3d strain = 0.5 * (turned + turned.transpose()) - 0.5 * (growth + growth.transpose());
     const double weight = rest_jacobian.determinant() / 8.0 * (fill + kEmptyShare * (1.0 - fill));
     const double trace = strain.trace();
     out.energy += weight * material.mu() * (strain.squaredNorm() - trace * trace / 3.0);
@@ -75,8 +85,10 @@ Measures measure(const Body& body, const lattice::Points& x, const lattice::Poin
                  const PosedFrames& posed, const Eigen::Vector3d& gravity) {
   Measures m;
   std::vector<CellMeasure> cells(body.mesh.cells.size());
+  std::optional<Growth> grown;
+  if (body.grows) grown = growth(body, posed);
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t c) {
-    cells[c] = measure_cell(body, c, x, cell_rotation(body, c, posed));
+    cells[c] = measure_cell(body, c, x, cell_rotation(body, c, posed), grown ? &grown->shape : nullptr);
   });
   m.min_det = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < cells.size(); ++c) {

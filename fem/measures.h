@@ -4,7 +4,8 @@
 
 namespace sinew::fem {
 
-/// What a frame reports about the flesh at one instant.
+/// What a frame reports about the flesh at one instant; strains, det F and energy from the shape free of
+/// strain, which has grown where the clip scales joints.
 struct Measures {
   double kinetic = 0.0;        ///< 1/2 v^T M v [J].
   double elastic = 0.0;        ///< 1/2 u^T K u, u of each cell in the rotation of its dominant frames [J].

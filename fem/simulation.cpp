@@ -53,6 +53,12 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
   options_.validate();
   // Flesh without inertia stands at the end of every step; a start of BDF2 would extrapolate beyond it.
   if (!info_->dynamic) options_.integrator = Integrator::BackwardEuler;
+  if ((options_.integrator == Integrator::TrBdf2 || options_.integrator == Integrator::ImplicitMidpoint) &&
+      body.regions.size() > 1) {
+    throw std::invalid_argument(
+        "integrator: tr-bdf2 and implicit-midpoint are for flesh linearised in one region, got " +
+        std::to_string(body.regions.size()) + " regions; hint: bdf2 or backward-euler");
+  }
   now_ = pose_at(start_time);
   past_ = now_;
   state_.time = start_time;
@@ -110,6 +116,8 @@ SimulationReport Simulation::settle() {
   SimulationReport report;
   report.time = state_.time;
   const double eta_h = stage_of(options_.integrator).eta * options_.step;
+  // At most one and a half stages at once: a stiff mode that is carried twice as far never comes to rest.
+  const double span = std::min(1.0, 1.5 * stage_of(options_.integrator).eta);
   const long limit =
       info_->dynamic ? std::lround(std::ceil(options_.settle_limit / options_.step)) : 0;  // steps
   PosedFrames earlier = now_, later = now_;
@@ -130,7 +138,7 @@ SimulationReport Simulation::settle() {
     if (!solve.ok()) return failed(solve);
     // Implicit drag at the critical rate 2 w0: the equilibrium is that of the run's own matrices.
     const double keep = 1.0 / (1.0 + 4.0 * std::numbers::pi * body_.damping.frequency * h);
-    state_.x += h * v;
+    state_.x += span * h * v;
     state_.v = keep * v;
     place_bones(body_, now_, state_.x);
     ++report.steps;
@@ -211,48 +219,84 @@ StageProblem Simulation::stage(const Points& x_h, const Points& v_h, const Stage
   return problem;
 }
 
+SolveReport Simulation::stage_without_history(double span, double h, const PosedFrames& next, State& after) {
+  const Stage scheme = stage_of(options_.integrator);
+  const PosedFrames middle = pose_at(state_.time + scheme.eta * h);
+  Points v;
+  const SolveReport solve = model_->solve_stage(
+      stage(state_.x, state_.v, {has_before_ ? &past_ : nullptr, &now_, &middle}, h, false), v);
+  if (!solve.ok()) return solve;
+  after.x = state_.x + span * v;
+  after.v = state_.v + (v - state_.v) * (span / (scheme.theta * h));
+  place_bones(body_, next, after.x);
+  return solve;
+}
+
+SolveReport Simulation::stage_with_history(double h, const PosedFrames& next, State& after) {
+  const Stage scheme = stage_of(options_.integrator);
+  const Points x_h = state_.x + scheme.look_back * (state_.x - state_.x_past);
+  const Points v_h = state_.v + scheme.look_back * (state_.v - state_.v_past);
+  const SolveReport solve = model_->solve_stage(stage(x_h, v_h, {&past_, &now_, &next}, h, true), after.v);
+  if (!solve.ok()) return solve;
+  after.x = x_h + scheme.eta * h * after.v;
+  place_bones(body_, next, after.x);
+  return solve;
+}
+
+void Simulation::accept(State after, PosedFrames next) {
+  after.x_past = state_.x;
+  after.v_past = state_.v;
+  state_ = std::move(after);
+  past_ = std::move(now_);
+  now_ = std::move(next);
+  has_before_ = true;
+}
+
 SimulationReport Simulation::step_once(double h) {
   SimulationReport report;
   SolveReport solve = model_->prepare(h, options_.integrator);
   if (!solve.ok()) return failed(solve);
   const double end = state_.time + h;
-  const bool bdf2 = options_.integrator == Integrator::Bdf2;
-  const bool regular = bdf2 && state_.has_past() && last_h_ == h;
-  const PosedFrames next = pose_at(end);
-  const Stage scheme = stage_of(options_.integrator);
-  const StagePoses poses{has_before_ ? &past_ : nullptr, &now_, &next};
-  State after;
+  PosedFrames next = pose_at(end);
+  State begin = state_, after;
   after.time = end;
-  if (regular) {
-    const Points x_h = (4.0 * state_.x - state_.x_past) / 3.0;
-    const Points v_h = (4.0 * state_.v - state_.v_past) / 3.0;
-    solve = model_->solve_stage(stage(x_h, v_h, poses, h, true), after.v);
-    if (!solve.ok()) return failed(solve);
-    after.x = x_h + scheme.eta * h * after.v;
-  } else if (bdf2) {
-    // Start and restart: one theta step to t + 2h/3 with the same factor, extrapolated to the end of the
-    // step.
-    const PosedFrames middle = pose_at(state_.time + scheme.eta * h);
-    Points v;
-    solve = model_->solve_stage(stage(state_.x, state_.v, {poses.before, &now_, &middle}, h, false), v);
-    if (!solve.ok()) return failed(solve);
-    after.x = state_.x + h * v;
-    after.v = state_.v + (v - state_.v) / scheme.theta;
-  } else {
-    solve = model_->solve_stage(stage(state_.x, state_.v, poses, h, false), after.v);
-    if (!solve.ok()) return failed(solve);
-    after.x = state_.x + h * after.v;
+  switch (options_.integrator) {
+    case Integrator::Bdf2:
+      solve = state_.has_past() && last_h_ == h ? stage_with_history(h, next, after)
+                                                : stage_without_history(h, h, next, after);
+      break;
+    case Integrator::ImplicitMidpoint:
+      solve = stage_without_history(h, h, next, after);
+      break;
+    case Integrator::TrBdf2: {
+      State middle;
+      middle.time = state_.time + kTrBdf2Break * h;
+      PosedFrames posed = pose_at(middle.time);
+      solve = stage_without_history(kTrBdf2Break * h, h, posed, middle);
+      if (!solve.ok()) break;
+      PosedFrames begin_pose = now_, begin_past = past_;
+      const bool had_before = has_before_;
+      accept(std::move(middle), std::move(posed));
+      solve = stage_with_history(h, next, after);
+      // The whole step from here on: its middle is nobody's history.
+      state_ = begin;
+      now_ = std::move(begin_pose);
+      past_ = std::move(begin_past);
+      has_before_ = had_before;
+      break;
+    }
+    case Integrator::BackwardEuler: {
+      const StagePoses poses{has_before_ ? &past_ : nullptr, &now_, &next};
+      solve = model_->solve_stage(stage(state_.x, state_.v, poses, h, false), after.v);
+      if (!solve.ok()) break;
+      after.x = state_.x + h * after.v;
+      place_bones(body_, next, after.x);
+      break;
+    }
   }
-  place_bones(body_, next, after.x);
-  before_ = std::move(state_);
-  if (bdf2) {
-    after.x_past = before_.x;
-    after.v_past = before_.v;
-  }
-  state_ = std::move(after);
-  past_ = std::move(now_);
-  now_ = next;
-  has_before_ = true;
+  if (!solve.ok()) return failed(solve);
+  before_ = std::move(begin);
+  accept(std::move(after), std::move(next));
   last_h_ = h;
   report.time = state_.time;
   report.steps = 1;

@@ -79,6 +79,11 @@ class Simulation {
   PosedFrames pose_at(double time) const { return pose_frames(body_.tree, motion_(time), time); }
   int halvings_for(double begin, double h) const;
   SimulationReport step_once(double h);
+  /// One stage to now + eta h, extrapolated to now + span with the pose `next`.
+  SolveReport stage_without_history(double span, double h, const PosedFrames& next, State& after);
+  /// One stage to the pose `next` from the present and state_.x_past.
+  SolveReport stage_with_history(double h, const PosedFrames& next, State& after);
+  void accept(State after, PosedFrames next);
   StageProblem stage(const lattice::Points& x_h, const lattice::Points& v_h, const StagePoses& poses,
                      double h, bool use_past);
   SimulationReport failed(const SolveReport& solve) const;

@@ -87,6 +87,7 @@ std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTre
     const double kappa = c * mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
     ties.push_back(
         add_tie({bone.rest_start, bone.rest_end, radius}, frame, bone.frame, kappa, mesh, limbs, matrices));
+    ties.back().bone = b;
   }
   for (const auto& soft : lattice.soft_frames) {
     const int frame = tree.frame_of_joint[static_cast<std::size_t>(soft.frame)];

@@ -21,6 +21,7 @@ struct TieOptions {
 /// One tie: what its target T_b X contributes to the force, per leaf vertex it touches.
 struct Tie {
   int frame = -1;  ///< frame index whose T it follows.
+  int bone = -1;   ///< of the lattice; -1 for a soft frame.
   Eigen::Vector3d centre_rest{0, 0,
                               0};  ///< C_b; moments are taken about it, so that far positions stay accurate.
   std::vector<int> vertices;       ///< leaf vertices, ascending.
