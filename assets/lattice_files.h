@@ -51,8 +51,8 @@ LatticeFields skin_fields(const lattice::ControlLattice& lattice, const lattice:
 /// VTK files have the cell arrays dihedral [degrees], scaled_jacobian [-], volume [m^3], frame (a joint
 /// index: the frame of the bone or soft frame nearest to the cell's mean), region (the user's regions; frame
 /// where there are none), bone (of the lines, an index; -1 for cells) and place (of cells that coincide, one
-/// for each limb, the smallest index; else -1), the point array bone (-1 off the bones), `fields`, and the file array sinew_lattice (text). On lines real arrays are NaN (-1 in .vtk as
-/// text).
+/// for each limb, the smallest index; else -1), the point array bone (-1 off the bones), `fields`, and the
+/// file array sinew_lattice (text). On lines real arrays are NaN (-1 in .vtk as text).
 std::string format_lattice(LatticeFormat format, const lattice::ControlLattice& lattice,
                            const lattice::JointTree& joints, const LatticeFields& fields = {},
                            std::string* second = nullptr);

@@ -119,7 +119,7 @@ struct ControlLattice {
   double edge_length = 0.0;  ///< target edge h [m].
   /// A plain grid of cubes, all bones soft: the builder's last resort.
   bool is_grid = false;
-  int retries = 0;           ///< how many attempts the gate refused.
+  int retries = 0;  ///< how many attempts the gate refused.
   /// Regions of the user's file (physical groups, references): the number of every cell's, or empty.
   std::vector<int> regions;
   std::vector<RegionName> region_names;  ///< of some of them.

@@ -90,7 +90,7 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"step", &Scene::step, "time step", "h", {1e-6, 0.1}, "s", "1/120"},
     {"model", ModelMember{&Scene::model}, "model of the flesh, from the cheapest to the most exact"},
     {"integrator", &Scene::integrator,
-     "bdf2, backward-euler (more damped, cannot fail), or for one region tr-bdf2, implicit-midpoint"},
+     "bdf2, backward-euler (more damped, cannot fail), tr-bdf2 or implicit-midpoint"},
     {"precision", &Scene::precision, "of the factors: double, or float (faster, relative error near 3e-7)"},
     {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
     {"frames", &Scene::frames, "output frames A-B, both included; left out: the whole clip"},

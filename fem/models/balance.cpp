@@ -97,7 +97,7 @@ Balance stage_balance(const Body& body, const StageProblem& p) {
   Balance b;
   b.pose = p.poses.stage;
   if (p.use_past) {
-    b.past = {{4.0 / 3.0, &state.x}, {-1.0 / 3.0, &state.x_past}};
+    b.past = {{1.0 + stage.look_back, &state.x}, {-stage.look_back, &state.x_past}};
     b.past_poses = {p.poses.now, p.poses.before};
   } else {
     b.past = {{1.0, &state.x}};
@@ -116,7 +116,7 @@ Balance stage_balance(const Body& body, const StageProblem& p) {
   b.tie_target = tie_targets(body, *p.poses.stage);
   b.load = weights(body, p.gravity, p.force);
 
-  const double elapsed = p.use_past ? p.h : eta_h;  // a start's stage lies at t + eta h
+  const double elapsed = p.use_past ? stage.reach * p.h : eta_h;  // a start's stage lies at t + eta h
   b.guess = state.x + elapsed * predicted_velocity(body, state, p.poses, elapsed);
   place_bones(body, *p.poses.stage, b.guess);
   fill_inactive_leaves(body, b.guess);
