@@ -18,6 +18,7 @@ void add_compare_command(CLI::App& app, CommandContext& context);
 void add_inspect_command(CLI::App& app, CommandContext& context);
 void add_ladder_command(CLI::App& app, CommandContext& context);
 void add_lattice_command(CLI::App& app, CommandContext& context);
+void add_pose_command(CLI::App& app, CommandContext& context);
 void add_simulate_command(CLI::App& app, CommandContext& context);
 
 }  // namespace sinew::tools

@@ -26,6 +26,7 @@ void add_commands(CLI::App& app, CommandContext& context) {
   add_inspect_command(app, context);
   add_ladder_command(app, context);
   add_lattice_command(app, context);
+  add_pose_command(app, context);
   add_simulate_command(app, context);
 }
 
