@@ -65,8 +65,8 @@ std::string hash_of(std::string_view text) {
 
 void add_options(Hash& hash, const lattice::BuildOptions& options) {
   // Fails to compile where a field is added: add it here, too.
-  const auto& [cells, cell_size, size_factors, include, exclude, tip_bones, symmetry, max_retries,
-               min_dihedral_degrees, min_scaled_jacobian] = options;
+  const auto& [cells, cell_size, size_factors, include, exclude, tip_bones, symmetry, construction,
+               max_retries, min_dihedral_degrees, min_scaled_jacobian] = options;
   hash.add(cells);
   hash.add(cell_size ? 1 : 0);
   hash.add(cell_size.value_or(0.0));
@@ -75,15 +75,29 @@ void add_options(Hash& hash, const lattice::BuildOptions& options) {
     hash.add(size.joint);
     hash.add(size.factor);
   }
-  for (const std::vector<int>& joints : {include, exclude}) {
-    hash.add(static_cast<int>(joints.size()));
-    for (int joint : joints) hash.add(joint);
+  for (const std::vector<int>* joints : {&include, &exclude}) {
+    hash.add(static_cast<int>(joints->size()));
+    for (int joint : *joints) hash.add(joint);
   }
   hash.add(static_cast<int>(tip_bones));
   hash.add(static_cast<int>(symmetry));
+  hash.add(static_cast<int>(construction));
   hash.add(max_retries);
   hash.add(min_dihedral_degrees);
   hash.add(min_scaled_jacobian);
+}
+
+Json to_json(const std::vector<lattice::GateFailure>& failures) {
+  Json json = Json::array();
+  for (const lattice::GateFailure& failure : failures)
+    json.push_back(Json::array({failure.what, failure.tolerable}));
+  return json;
+}
+
+std::vector<lattice::GateFailure> failures_from(const Json& json) {
+  std::vector<lattice::GateFailure> failures;
+  for (const Json& failure : json) failures.push_back({failure.at(0), failure.at(1)});
+  return failures;
 }
 
 /// What the file of the lattice does not hold.
@@ -92,9 +106,15 @@ std::string facts_of(const lattice::BuildResult& result) {
   const auto& [dihedral, jacobian, volume, ratio, vertices, triangles, exact, components, floating] = q;
   Json json;
   json["quality"] = {dihedral, jacobian, volume, ratio, vertices, triangles, exact, components, floating};
-  json["failures"] = Json::array();
-  for (const lattice::GateFailure& failure : result.failures)
-    json["failures"].push_back(Json::array({failure.what, failure.tolerable}));
+  json["failures"] = to_json(result.failures);
+  json["refused"] = Json::array();
+  for (const lattice::RefusedAttempt& attempt : result.refused)
+    json["refused"].push_back(Json::array({attempt.name, to_json(attempt.failures)}));
+  json["no_mirror"] = result.no_mirror;
+  if (result.mirror) {
+    const Eigen::Vector3d& n = result.mirror->normal;
+    json["mirror"] = {n.x(), n.y(), n.z(), result.mirror->offset};
+  }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -112,7 +132,14 @@ void take_facts(const std::string& text, lattice::BuildResult& result) {
   exact = values.at(6);
   components = values.at(7);
   floating = values.at(8);
-  for (const Json& failure : json.at("failures")) result.failures.push_back({failure.at(0), failure.at(1)});
+  result.failures = failures_from(json.at("failures"));
+  for (const Json& attempt : json.at("refused"))
+    result.refused.push_back({attempt.at(0), failures_from(attempt.at(1))});
+  result.no_mirror = json.at("no_mirror");
+  if (json.contains("mirror")) {
+    const Json& plane = json.at("mirror");
+    result.mirror = lattice::MirrorPlane{{plane.at(0), plane.at(1), plane.at(2)}, plane.at(3)};
+  }
 }
 
 std::string file_of(const std::string& folder, const std::string& key) {
