@@ -134,11 +134,12 @@ void take_facts(const std::string& text, lattice::BuildResult& result) {
   floating = values.at(8);
   result.failures = failures_from(json.at("failures"));
   for (const Json& attempt : json.at("refused"))
-    result.refused.push_back({attempt.at(0), failures_from(attempt.at(1))});
-  result.no_mirror = json.at("no_mirror");
+    result.refused.push_back({attempt.at(0).get<std::string>(), failures_from(attempt.at(1))});
+  result.no_mirror = json.at("no_mirror").get<std::string>();
   if (json.contains("mirror")) {
     const Json& plane = json.at("mirror");
-    result.mirror = lattice::MirrorPlane{{plane.at(0), plane.at(1), plane.at(2)}, plane.at(3)};
+    const auto number = [&](std::size_t i) { return plane.at(i).get<double>(); };
+    result.mirror = lattice::MirrorPlane{Eigen::Vector3d(number(0), number(1), number(2)), number(3)};
   }
 }
 

@@ -243,7 +243,7 @@ void run_lattice(const LatticeRequest& request) {
   load.height = scene.height.value_or(0.0);
   const assets::Rig rig = assets::load_rig(scene.rig, load);
   const assets::LatticeInput input = assets::lattice_input(rig);
-  check_memory(request.cells);
+  if (scene.lattice.empty() && !scene.cell_size) check_memory(scene.cells);
   stop_if_interrupted("before building the lattice");
   const assets::CachedBuild built = make_lattice(scene, rig, input);
   const lattice::ControlLattice& lattice = built.result.lattice;

@@ -98,6 +98,8 @@ inline fem::Body bar_body(const BarOptions& options) {
                  {},
                  {std::move(region)},
                  options.damping,
+                 false,
+                 {},
                  {},
                  0.0,
                  0.0};
