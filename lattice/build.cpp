@@ -242,6 +242,8 @@ BuildResult best_attempt_of(const RigInput& input, const BuildOptions& options) 
 
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
   options.validate();
+  if (!options.size_factors.empty())
+    throw std::invalid_argument("size_factors: cells are of one size everywhere; hint: choose cell_size");
   BuildOptions whole = options;
   whole.symmetry = Symmetry::Off;
   if (options.construction == Construction::Grid) {

@@ -35,8 +35,8 @@ struct BuildOptions {
   int cells = 1000;
   /// Target edge h [m]; > 0. Where it is given, `cells` is not used and nothing is searched.
   std::optional<double> cell_size = std::nullopt;
-  /// Finer and coarser places; the size between bones changes smoothly. A joint may be named once. With
-  /// factors the wanted number of cells holds for the whole lattice as before.
+  /// Finer and coarser places. A joint may be named once. build() makes cells of one size everywhere so far
+  /// and refuses factors.
   std::vector<SizeFactor> size_factors = {};
   /// Joints that take part: where not empty, all others are treated as excluded.
   std::vector<int> include = {};

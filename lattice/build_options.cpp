@@ -26,7 +26,7 @@ void check_joint(const char* field, int joint, int num_joints) {
 }  // namespace
 
 std::size_t estimated_build_bytes(int cells) {
-  // Measured peaks of whole builds at 1e4 and 1e5 cells; the rest is what a program takes without a lattice.
+  // Measured peaks of whole runs: 37 MB at 9922 cells, 100 MB at 39712.
   constexpr std::size_t kPerCell = 2000, kBase = 20'000'000;
   return kBase + kPerCell * static_cast<std::size_t>(cells);
 }

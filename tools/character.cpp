@@ -215,28 +215,11 @@ fem::Body make_body(const Character& character) {
   }
 }
 
-namespace {
-
-fem::Integrator integrator_of(Integrator named) {
-  switch (named) {
-    case Integrator::BackwardEuler:
-      return fem::Integrator::BackwardEuler;
-    case Integrator::TrBdf2:
-      return fem::Integrator::TrBdf2;
-    case Integrator::ImplicitMidpoint:
-      return fem::Integrator::ImplicitMidpoint;
-    case Integrator::Bdf2:
-      break;
-  }
-  return fem::Integrator::Bdf2;
-}
-
-}  // namespace
-
 fem::SimulationOptions simulation_options(const Scene& scene) {
   fem::SimulationOptions options;
   options.step = scene.step;
-  options.integrator = integrator_of(scene.integrator);
+  options.integrator =
+      scene.integrator == Integrator::Bdf2 ? fem::Integrator::Bdf2 : fem::Integrator::BackwardEuler;
   options.model = scene.model;
   options.solver.precision =
       scene.precision == Precision::Double ? fem::Precision::Double : fem::Precision::Float;

@@ -12,7 +12,7 @@
 /// What one run of `sinew simulate` is asked to do: every flag of the command and every key of a scene file.
 namespace sinew::tools {
 
-enum class Integrator { Bdf2, BackwardEuler, TrBdf2, ImplicitMidpoint };
+enum class Integrator { Bdf2, BackwardEuler };
 
 /// Numbers in which factors are kept for solving; everything else is double.
 enum class Precision { Double, Float };

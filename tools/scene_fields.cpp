@@ -89,8 +89,7 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"gravity", &Scene::gravity, "gravity, Y up", "each component", {-1e4, 1e4}, "m/s^2", "0,-9.81,0"},
     {"step", &Scene::step, "time step", "h", {1e-6, 0.1}, "s", "1/120"},
     {"model", ModelMember{&Scene::model}, "model of the flesh, from the cheapest to the most exact"},
-    {"integrator", &Scene::integrator,
-     "bdf2, backward-euler (more damped, cannot fail), tr-bdf2 or implicit-midpoint"},
+    {"integrator", &Scene::integrator, "bdf2 or backward-euler (more damped, cannot fail)"},
     {"precision", &Scene::precision, "of the factors: double, or float (faster, relative error near 3e-7)"},
     {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
     {"frames", &Scene::frames, "output frames A-B, both included; left out: the whole clip"},
@@ -113,10 +112,9 @@ constexpr auto kFields = std::to_array<SceneField>({
      "mesh (OBJ, PLY) whose vertex order the output takes over"},
 });
 
-const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler", "tr-bdf2",
-                                                "implicit-midpoint"};  // in the enum's order
-const std::vector<std::string> kPrecisionNames{"double", "float"};     // in the enum's order
-const std::vector<std::string> kOutputSpaceNames{"file", "si"};        // in the enum's order
+const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
+const std::vector<std::string> kPrecisionNames{"double", "float"};          // in the enum's order
+const std::vector<std::string> kOutputSpaceNames{"file", "si"};             // in the enum's order
 
 const std::vector<std::string> kSwitchNames{"off", "on"};  // in the enum's order
 

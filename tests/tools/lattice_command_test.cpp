@@ -24,7 +24,8 @@ struct Outcome {
 class LatticeCommand : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = testing::TempDir() + "sinew_lattice_command";
+    folder_ = testing::TempDir() + "sinew_lattice_command_" +
+              testing::UnitTest::GetInstance()->current_test_info()->name();
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directory(folder_);
   }

@@ -183,8 +183,7 @@ TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
       {"frames = \"first\"",
        "scene.toml:1: frames: got 'first', expected A-B, two frame numbers; hint: 0-47"},
       {"integrator = \"bdf3\"",
-       "scene.toml:1: integrator: got 'bdf3', expected bdf2, backward-euler, tr-bdf2 or implicit-midpoint; "
-       "hint: bdf2"},
+       "scene.toml:1: integrator: got 'bdf3', expected bdf2 or backward-euler; hint: bdf2"},
       {"model = \"blendde\"",
        "scene.toml:1: model: got 'blendde', expected one of " + model_list() + "; hint: blended"},
       {"model = \"magic\"",
