@@ -21,6 +21,7 @@ using CellBase =
 using Delaunay =
     CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
 
+constexpr double kOffHull = 1e-9;  ///< from the plane of a half into it, unit coordinates.
 constexpr int kSplitRounds = 8;
 constexpr int kRelaxRounds = 4;
 constexpr double kRelaxReach = 2.0;  ///< free points this near a bone are relaxed, in units of h.
@@ -156,8 +157,12 @@ Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const
   Delaunay::Cell_handle hint;
   for (const Vector3d& p : samples.points) {
     hint = delaunay.locate(to_cgal(p), hint);
-    // A point on the hull, as in the plane of a half, may be found outside.
-    if (delaunay.is_infinite(hint)) hint = hint->neighbor(hint->index(delaunay.infinite_vertex()));
+    if (delaunay.is_infinite(hint)) {
+      // A point on the hull, as in the plane of a half, may be found outside, and beside any face of that
+      // plane.
+      hint = delaunay.locate(to_cgal(p + Vector3d(kOffHull, 0.0, 0.0)), hint);
+      if (delaunay.is_infinite(hint)) hint = hint->neighbor(hint->index(delaunay.infinite_vertex()));
+    }
     hint->info() = true;
   }
   for (const std::vector<int>& chain : points.chains)
