@@ -138,7 +138,7 @@ class LimbCopiesInMotion : public testing::Test {
  protected:
   Legs legs_;
   ControlLattice lattice_ = lattice::build(legs_.character.skin, legs_.character.joints,
-                                           {.cells = 220, .symmetry = lattice::Symmetry::Off})
+                                           {.cells = 80, .symmetry = lattice::Symmetry::Off})
                                 .lattice;
   std::vector<std::vector<Eigen::Affine3d>> poses_{legs_.swing(0.7, 0.7)(0.0), legs_.swing(0.7, 0.7)(1.0)};
   BodyOptions options_ = [] {
