@@ -385,7 +385,8 @@ TEST(Build, RefusesWhatItCannotUse) {
             "size_factors: got 0.1, expected a factor in [0.2, 5]");
   EXPECT_EQ(message(arm(), {.size_factors = {{1, 0.5}, {1, 2.0}}}),
             "size_factors: got 1, expected every joint at most once");
-  EXPECT_EQ(message(arm(), {.size_factors = {{3, 0.5}}}), "size_factors: got joint 3, expected 0 ... 2");
+  EXPECT_EQ(message(arm(), {.size_factors = {{1, 0.5}}}),
+            "size_factors: cells are of one size everywhere; hint: choose cell_size");
   EXPECT_EQ(message(arm(), {.include = {7}}), "include: got joint 7, expected 0 ... 2");
   EXPECT_EQ(message(arm(), {.exclude = {0, 1, 2}}), "exclude: all 3 joints, expected at least one left");
 }
