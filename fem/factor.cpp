@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <vector>
 
 #include <Eigen/Core>
 #include <cholmod.h>
-#include <omp.h>
 
+#include "fem/detail/cholmod_alone.h"
 #include "fem/detail/panels.h"
 
 namespace sinew::fem {
@@ -39,56 +38,12 @@ namespace {
 
 /// The workspace of one factorisation; CHOLMOD's common is not shared between threads.
 struct Common {
-  Common() {
-    cholmod_start(&common);
-    common.supernodal = CHOLMOD_SUPERNODAL;
-    common.nmethods = 2;  // the better of two orderings: a region may be too small for METIS to win
-    common.method[0].ordering = CHOLMOD_METIS;
-    common.method[1].ordering = CHOLMOD_AMD;
-    common.postorder = true;
-    common.print = 0;
-    common.final_ll = true;
-  }
+  Common() { detail::start_supernodal(common); }
   ~Common() { cholmod_finish(&common); }
   Common(const Common&) = delete;
   Common& operator=(const Common&) = delete;
   cholmod_common common;
 };
-
-/// Lower triangle of D A D in CHOLMOD's form; borrows the arrays.
-cholmod_sparse view_lower(Eigen::SparseMatrix<double>& lower) {
-  cholmod_sparse view{};
-  view.nrow = static_cast<std::size_t>(lower.rows());
-  view.ncol = static_cast<std::size_t>(lower.cols());
-  view.nzmax = static_cast<std::size_t>(lower.nonZeros());
-  view.p = lower.outerIndexPtr();
-  view.i = lower.innerIndexPtr();
-  view.x = lower.valuePtr();
-  view.stype = -1;
-  view.itype = CHOLMOD_INT;
-  view.xtype = CHOLMOD_REAL;
-  view.dtype = CHOLMOD_DOUBLE;
-  view.sorted = 1;
-  view.packed = 1;
-  return view;
-}
-
-/// Fill-reducing order and pattern of the factor; one thread at a time: METIS draws its random numbers from
-/// the C library's one generator (srand, rand), and orders that share it differ from run to run.
-cholmod_factor* analyse(cholmod_sparse& matrix, cholmod_common& common) {
-  static std::mutex one_at_a_time;
-  const std::lock_guard lock(one_at_a_time);
-  return cholmod_analyze(&matrix, &common);
-}
-
-/// The numbers of the factor, in the calling thread alone: CHOLMOD would start four OpenMP threads beside
-/// each of ours; on two busy cores that was 1.8 times slower.
-void factorise_numbers(cholmod_sparse& matrix, cholmod_factor* factor, cholmod_common& common) {
-  const int levels = omp_get_max_active_levels();  // the caller's own, of this thread
-  omp_set_max_active_levels(0);
-  cholmod_factorize(&matrix, factor, &common);
-  omp_set_max_active_levels(levels);
-}
 
 /// The supernodes of CHOLMOD's factor, which must outlive the result. `wanted`: rows of A, all where empty.
 std::vector<detail::Supernode> supernodes_of(const cholmod_factor& factor,
@@ -130,15 +85,12 @@ Factor::Report Factor::factorise(const Eigen::SparseMatrix<double>& matrix, Prec
   lower = impl->scale.asDiagonal() * lower * impl->scale.asDiagonal();
   lower.makeCompressed();
 
-  // One at a time: METIS draws from the process's one random sequence, so that concurrent orderings would
-  // differ from run to run, and serial OpenBLAS shares its buffers between callers. Solves use neither.
-  static std::mutex one_at_a_time;
-  const std::lock_guard<std::mutex> lock(one_at_a_time);
+  const detail::CholmodAlone alone;
   Common workspace;
-  cholmod_sparse view = view_lower(lower);
-  cholmod_factor* factor = analyse(view, workspace.common);
+  cholmod_sparse view = detail::view_lower(lower);
+  cholmod_factor* factor = cholmod_analyze(&view, &workspace.common);
   if (factor == nullptr) return {false, 0, "out of memory in the symbolic analysis"};
-  factorise_numbers(view, factor, workspace.common);
+  cholmod_factorize(&view, factor, &workspace.common);
   Report report;
   if (workspace.common.status == CHOLMOD_NOT_POSDEF || factor->minor < factor->n) {
     const int pivot = static_cast<const int*>(factor->Perm)[std::min(factor->minor, factor->n - 1)];
