@@ -447,7 +447,8 @@ void BlendedSolver::Impl::solve_region(RegionSystem& s, const StepData& step, co
   }
   for (const auto& [t, rows] : s.ties) {
     const Tie& tie = body->ties[static_cast<std::size_t>(t)];
-    const Eigen::Affine3d target = tie_target(*body, tie, *step.poses.stage);
+    const auto& growth = step.rest_end.growth;
+    const Eigen::Affine3d target = tie_target(*body, tie, *step.poses.stage, growth ? &*growth : nullptr);
     const Eigen::Matrix3d turn = to_local * target.linear();
     const Eigen::Vector3d centre = to_local * (target * tie.centre_rest - end.origin);
     for (const auto& [k, r] : rows) {

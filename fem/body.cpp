@@ -231,7 +231,7 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
             {},
             0.0,
             0.0};
-  if (body.grows) body.bone_extension = bone_extension(body.hierarchy, body.mesh, body.bones);
+  if (body.grows) body.bone_extension = bone_extension(body.hierarchy, body.mesh, body.skin, body.bones);
   body.vertex_mass.assign(static_cast<std::size_t>(body.mesh.num_vertices()), 0.0);
   for (int a = 0; a < body.mesh.num_vertices(); ++a) {
     for (int e = body.matrices.row_start[static_cast<std::size_t>(a)];

@@ -71,15 +71,20 @@ Eigen::MatrixXd solve_laplacian(const std::set<std::pair<int, int>>& edges, cons
   return factor.solve(rhs);
 }
 
+/// Level-0 hats at the skin's vertices, num_points x num_coarse; level-0 functions are the first ones.
+Eigen::SparseMatrix<double, Eigen::RowMajor> coarse_hats(const lattice::LeafMesh& mesh,
+                                                         const lattice::Embedding& skin, int num_coarse) {
+  return Eigen::SparseMatrix<double, Eigen::RowMajor>(skin.weights * mesh.values_from_coefficients)
+      .leftCols(num_coarse);
+}
+
 /// Coarse weights, num_coarse x num_frames, dense: a few hundred rows.
 Eigen::MatrixXd solve_coarse(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
                              const lattice::Embedding& skin, const lattice::Surface& surface,
                              const FrameTree& tree, const BoneConstraints& bones, int num_coarse) {
   const int num_frames = tree.num_frames();
-  // D and D sbar from the level-0 hats at the skin vertices; level-0 functions are the first ones.
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> hats =
-      Eigen::SparseMatrix<double, Eigen::RowMajor>(skin.weights * mesh.values_from_coefficients)
-          .leftCols(num_coarse);
+  // D and D sbar
+  const auto hats = coarse_hats(mesh, skin, num_coarse);
   Eigen::VectorXd d = Eigen::VectorXd::Zero(num_coarse);
   Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(num_coarse, num_frames);
   for (int k = 0; k < hats.outerSize(); ++k) {
@@ -174,12 +179,21 @@ FrameWeights frame_weights(const lattice::Hierarchy& hierarchy, const lattice::L
 }
 
 FrameWeights bone_extension(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
-                            const BoneConstraints& bones) {
+                            const lattice::Embedding& skin, const BoneConstraints& bones) {
   const int num_coarse = num_coarse_vertices(hierarchy, mesh);
   const auto num_bones = static_cast<Eigen::Index>(bones.vertices.size());
-  // Where no bone reaches the weights are zero: a whisper keeps the matrix regular.
-  const Eigen::VectorXd whisper = Eigen::VectorXd::Constant(num_coarse, 1e-9);
-  Eigen::MatrixXd fixed = Eigen::MatrixXd::Zero(num_coarse, num_bones);
+  // Where neither a bone nor the skin reaches, the weights are zero: a whisper keeps the matrix regular.
+  Eigen::VectorXd d = Eigen::VectorXd::Constant(num_coarse, 1e-9);
+  Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(num_coarse, num_bones + 1);
+  const auto hats = coarse_hats(mesh, skin, num_coarse);
+  for (int k = 0; k < hats.outerSize(); ++k) {
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(hats, k); it; ++it) {
+      const double phi = std::max(0.0, it.value());  // as in solve_coarse
+      d[it.col()] += phi;
+      rhs(it.col(), num_bones) += phi;
+    }
+  }
+  Eigen::MatrixXd fixed = Eigen::MatrixXd::Zero(num_coarse, num_bones + 1);
   std::vector<std::uint8_t> is_fixed(static_cast<std::size_t>(num_coarse), 0);
   for (Eigen::Index k = 0; k < num_bones; ++k) {
     const int vertex = bones.vertices[static_cast<std::size_t>(k)].vertex;
@@ -187,9 +201,8 @@ FrameWeights bone_extension(const lattice::Hierarchy& hierarchy, const lattice::
     is_fixed[static_cast<std::size_t>(vertex)] = 1;
     fixed(vertex, k) = 1.0;
   }
-  return prolonged(hierarchy, mesh,
-                   solve_laplacian(coarse_edges(hierarchy, mesh), whisper,
-                                   Eigen::MatrixXd::Zero(num_coarse, num_bones), is_fixed, fixed));
+  return prolonged(hierarchy, mesh, solve_laplacian(coarse_edges(hierarchy, mesh), d, rhs, is_fixed, fixed))
+      .leftCols(num_bones);
 }
 
 std::vector<int> dominant_frames(const FrameWeights& weights) {

@@ -19,11 +19,12 @@ FrameWeights frame_weights(const lattice::Hierarchy& hierarchy, const lattice::L
                            const lattice::Embedding& skin, const lattice::Surface& surface,
                            const FrameTree& tree, const BoneConstraints& bones);
 
-/// Weights by which what is known at the hard bones' vertices spreads over the leaf vertices: harmonic on the
-/// graph of the lattice's edges, num_vertices x bones.vertices.size(). Rows sum to 1, or to 0 where no bone
-/// reaches. Columns of vertices finer than level 0 are empty.
+/// Weights by which what is known at the hard bones' vertices spreads over the leaf vertices, num_vertices x
+/// bones.vertices.size(): on level 0 (L + D) e = 0 off the bones, L and D as above, so that little of it
+/// arrives at the skin. Rows sum to at most 1; a vertex on a bone has its own value. Columns of vertices
+/// finer than level 0 are empty.
 FrameWeights bone_extension(const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
-                            const BoneConstraints& bones);
+                            const lattice::Embedding& skin, const BoneConstraints& bones);
 
 /// Index of the largest weight of each row (the smaller index on a tie).
 std::vector<int> dominant_frames(const FrameWeights& weights);

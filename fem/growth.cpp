@@ -64,9 +64,33 @@ Growth growth(const Body& body, const PosedFrames& posed) {
   return g;
 }
 
-Eigen::Affine3d tie_target(const Body& body, const Tie& tie, const PosedFrames& posed) {
+namespace {
+
+/// T_f moved to put the middle of the tie where the grown shape has it.
+Eigen::Affine3d soft_frame_target(const Body& body, const Tie& tie, const PosedFrames& posed,
+                                  const Growth& growth) {
+  const auto f = static_cast<std::size_t>(tie.frame);
+  Eigen::Vector3d rest = Eigen::Vector3d::Zero(), grown = Eigen::Vector3d::Zero();
+  double weight = 0.0;
+  for (std::size_t k = 0; k < tie.vertices.size(); ++k) {
+    rest += tie.zeroth[k] * body.mesh.points.row(tie.vertices[k]).transpose();
+    grown += tie.zeroth[k] * growth.shape.row(tie.vertices[k]).transpose();
+    weight += tie.zeroth[k];
+  }
+  Eigen::Affine3d target = posed.frames[f].from_rest;
+  if (!(weight > 0.0)) return target;
+  const Eigen::Vector3d origin = target * body.tree.frames[f].origin_rest;
+  const Eigen::Vector3d middle = origin + posed.frames[f].rotation * (grown / weight - growth.origin[f]);
+  target.pretranslate(middle - target * (rest / weight));
+  return target;
+}
+
+}  // namespace
+
+Eigen::Affine3d tie_target(const Body& body, const Tie& tie, const PosedFrames& posed, const Growth* growth) {
   Eigen::Affine3d target = posed.frames[static_cast<std::size_t>(tie.frame)].from_rest;
-  if (!body.grows || tie.bone < 0) return target;
+  if (growth == nullptr) return target;
+  if (tie.bone < 0) return soft_frame_target(body, tie, posed, *growth);
   const auto& bone = body.lattice.bones[static_cast<std::size_t>(tie.bone)];
   const auto place = [&](const lattice::BoneAnchor& anchor, double s) -> Eigen::Vector3d {
     return (1.0 - s) * (posed.joints[static_cast<std::size_t>(anchor.joint_a)] * anchor.x_a) +

@@ -6,8 +6,9 @@
 
 /// Flesh on joints that a clip scales (squash and stretch) grows with them: its shape free of strain, Y, is
 /// what plain skinning shows with the joints' scales and places of the instant but all of them turned as at
-/// rest, corrected so that Y of a vertex on a bone is where the clip puts it. So a scale that all joints
-/// share costs no elastic energy, and no bone stings. Only where body.grows.
+/// rest, corrected so that Y of a vertex on a bone is where the clip puts it and that little of the
+/// correction arrives at the skin. So a scale that all joints share costs no elastic energy, and no bone
+/// stings. Only where body.grows.
 namespace sinew::fem {
 
 /// Y at one instant.
@@ -28,10 +29,13 @@ bool scales_joints(const PosedFrames& posed);
 
 /// Y = sum_f s_f [Y_f + S_f (X - C_f)] + d. The origins follow each other down the tree, Y_f = Y_p + R_p^T
 /// (c_f - c_p) with c their posed places, roots hung on the first root; d is what is missing at bone
-/// vertices, spread harmonically.
+/// vertices, spread by body.bone_extension.
 Growth growth(const Body& body, const PosedFrames& posed);
 
-/// Where tie `tie` pulls flesh to: T_b, stretched along its bone as the bone is.
-Eigen::Affine3d tie_target(const Body& body, const Tie& tie, const PosedFrames& posed);
+/// Where tie `tie` pulls flesh to: T_b. In a body that grows, along a bone stretched as the bone is, and
+/// about a soft frame moved so that its middle is where the grown shape has it, turned with the frame: the
+/// frame of flesh that follows several joints pulls no dent into it. `growth`: of `posed`; null where nothing
+/// grows.
+Eigen::Affine3d tie_target(const Body& body, const Tie& tie, const PosedFrames& posed, const Growth* growth);
 
 }  // namespace sinew::fem
