@@ -8,9 +8,9 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "assets/detail/preview_scene.h"
+#include "assets/detail/render_square.h"
 #include "lattice/quality.h"
 
 namespace sinew::assets {
@@ -19,8 +19,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int kGap = 2;        // between the views [pixels]
-constexpr int kSubpixels = 2;  // in each direction
+constexpr int kGap = 2;  // between the views [pixels]
 constexpr double kSkinOpacity = 0.45;
 const Vector3d kSkinColour(0.62, 0.40, 0.30);  // linear RGB
 const Vector3d kInk(0.17, 0.20, 0.24), kWorst(0.80, 0.05, 0.05);
@@ -80,29 +79,6 @@ Vector3d frame_colour(int index) {
   return colour;
 }
 
-/// Half of the light through the skin, half past it.
-void render_skin(Image& image, int left, int top, int size, const detail::Stage& stage,
-                 const detail::Body& skin, const detail::Body& nothing) {
-  tbb::parallel_for(0, size, [&](int y) {
-    for (int x = 0; x < size; ++x) {
-      const Vector2d shift = detail::light_shift(x, y);
-      Vector3d sum = Vector3d::Zero();
-      for (int sub = 0; sub < kSubpixels * kSubpixels; ++sub) {
-        const Vector2d place(x + (sub % kSubpixels + 0.5) / kSubpixels,
-                             y + (sub / kSubpixels + 0.5) / kSubpixels);
-        const Vector3d direction = stage.camera.direction(place / size);
-        const Vector3d through = detail::radiance(stage, skin, direction, {shift, sub}).cwiseMin(1.0);
-        const Vector3d past = detail::radiance(stage, nothing, direction, {shift, sub}).cwiseMin(1.0);
-        sum += kSkinOpacity * through + (1.0 - kSkinOpacity) * past;
-      }
-      const Vector3d srgb = detail::encode(sum / (kSubpixels * kSubpixels));
-      for (int c = 0; c < 3; ++c)
-        image.rgb[static_cast<std::size_t>(3 * ((top + y) * image.width + left + x) + c)] =
-            static_cast<std::uint8_t>(std::lround(255.0 * srgb[c]));
-    }
-  });
-}
-
 /// One view: everything is turned about the vertical and drawn by a camera that stands still.
 class View {
  public:
@@ -156,7 +132,13 @@ class View {
     one << 0, 1, 2;
     const detail::Body nothing =
         detail::make_body(nowhere, one, {0, 0, 0}, kSkinColour.transpose().replicate(3, 1));
-    render_skin(image_, left_, top_, size_, stage_, body, nothing);
+    // Part of the light through the skin, the rest past it.
+    const auto translucent = [&](const Vector3d& direction, const detail::LightSamples& samples) -> Vector3d {
+      const Vector3d through = detail::radiance(stage_, body, direction, samples).cwiseMin(1.0);
+      const Vector3d past = detail::radiance(stage_, nothing, direction, samples).cwiseMin(1.0);
+      return kSkinOpacity * through + (1.0 - kSkinOpacity) * past;
+    };
+    detail::render_square(image_, left_, top_, size_, stage_.camera, translucent);
   }
 
   void draw_bones(double unit) const {

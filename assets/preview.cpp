@@ -5,9 +5,9 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "assets/detail/preview_scene.h"
+#include "assets/detail/render_square.h"
 
 namespace sinew::assets {
 namespace {
@@ -18,7 +18,6 @@ using Eigen::Vector3d;
 constexpr int kGap = 2;             // between tiles [pixels]
 constexpr double kFullTint = 0.06;  // of the rest height: distance from plain skinning that tints fully [-]
 constexpr double kMostTint = 0.65;  // share of the tint's own colour where it is full
-constexpr int kSubpixels = 2;       // in each direction
 const Vector3d kFollower(0.045, 0.055, 0.075);  // linear RGB of parts that are not simulated
 const Vector3d kInk(0.17, 0.20, 0.24), kPaper(0.965, 0.955, 0.94);
 
@@ -86,27 +85,6 @@ lattice::Points tinted(lattice::Points colours, const lattice::Points& points, c
     colours.row(v) = (1.0 - share) * colours.row(v) + share * detail::tint_colour().transpose();
   }
   return colours;
-}
-
-void render_tile(Image& image, int left, int top, int size, const detail::Stage& stage,
-                 const detail::Body& body) {
-  tbb::parallel_for(0, size, [&](int y) {
-    for (int x = 0; x < size; ++x) {
-      const Vector2d shift = detail::light_shift(x, y);
-      Vector3d sum = Vector3d::Zero();
-      for (int sub = 0; sub < kSubpixels * kSubpixels; ++sub) {
-        const Vector2d place(x + (sub % kSubpixels + 0.5) / kSubpixels,
-                             y + (sub / kSubpixels + 0.5) / kSubpixels);
-        const Vector3d light =
-            detail::radiance(stage, body, stage.camera.direction(place / size), {shift, sub});
-        sum += light.cwiseMin(1.0);  // clipped before averaging, so that bright edges stay smooth
-      }
-      const Vector3d srgb = detail::encode(sum / (kSubpixels * kSubpixels));
-      for (int c = 0; c < 3; ++c)
-        image.rgb[static_cast<std::size_t>(3 * ((top + y) * image.width + left + x) + c)] =
-            static_cast<std::uint8_t>(std::lround(255.0 * srgb[c]));
-    }
-  });
 }
 
 void draw_bones(Image& image, int left, int top, int size, const detail::Stage& stage,
@@ -223,7 +201,10 @@ Image render_preview(const lattice::Triangles& triangles, const std::vector<Prev
       const lattice::Points& points = row == 0 ? frame.simulated : frame.skinned;
       const detail::Body body =
           detail::make_body(points, triangles, same_place, tinted(base, points, frame.skinned, height));
-      render_tile(image, layout.left(column), layout.top(row), layout.tile, stage, body);
+      detail::render_square(image, layout.left(column), layout.top(row), layout.tile, stage.camera,
+                            [&](const Vector3d& direction, const detail::LightSamples& samples) {
+                              return detail::radiance(stage, body, direction, samples);
+                            });
       draw_bones(image, layout.left(column), layout.top(row), layout.tile, stage, frame.bones);
       draw_labels(image, layout, row, column, frame);
     }

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "assets/detail/annotation.h"
+#include "assets/detail/numbered_vertices.h"
 #include "assets/detail/text_scanner.h"
 #include "assets/error.h"
 
@@ -22,19 +23,7 @@ std::int64_t read_nodes(TextScanner& in, VolumeMesh& mesh) {
   if (in.integer("dimension", 2, 3) != 3) in.fail("dimension: got 2, expected 3");
   const std::int64_t skipped =
       in.integer("number of attributes", 0, kMaxAttributes) + in.integer("boundary markers", 0, 1);
-  mesh.complex.points.resize(n, 3);
-  std::int64_t first = 1;
-  for (std::int64_t v = 0; v < n; ++v) {
-    if (v == 0)
-      first = in.integer("number of the first vertex", 0, 1);
-    else
-      in.integer("number of a vertex", first + v, first + v);
-    for (int k = 0; k < 3; ++k)
-      mesh.complex.points(v, k) = in.coordinate(fmt::format("vertex {}", first + v));
-    for (std::int64_t k = 0; k < skipped; ++k) in.real("attribute");
-    mesh.numbering.vertices.push_back(first + v);
-  }
-  return first;
+  return detail::read_numbered_vertices(in, n, skipped, "", mesh);
 }
 
 int region_of(TextScanner& in, double attribute) {

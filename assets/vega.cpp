@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "assets/detail/annotation.h"
+#include "assets/detail/numbered_vertices.h"
 #include "assets/detail/text.h"
 #include "assets/detail/text_scanner.h"
 #include "assets/error.h"
@@ -79,16 +80,7 @@ void Parser::read_vertices() {
   num_vertices_ = in_.count("*VERTICES", 8);
   in_.integer("*VERTICES: dimension", 3, 3);
   in_.rest_of_line();
-  mesh_.complex.points.resize(num_vertices_, 3);
-  for (std::int64_t v = 0; v < num_vertices_; ++v) {
-    if (v == 0)
-      first_ = in_.integer("*VERTICES: number of the first vertex", 0, 1);
-    else
-      in_.integer("*VERTICES: number of a vertex", first_ + v, first_ + v);
-    for (int k = 0; k < 3; ++k)
-      mesh_.complex.points(v, k) = in_.coordinate(fmt::format("*VERTICES: vertex {}", first_ + v));
-    mesh_.numbering.vertices.push_back(first_ + v);
-  }
+  first_ = detail::read_numbered_vertices(in_, num_vertices_, 0, "*VERTICES: ", mesh_);
   in_.rest_of_line();
 }
 
