@@ -65,8 +65,8 @@ std::string hash_of(std::string_view text) {
 
 void add_options(Hash& hash, const lattice::BuildOptions& options) {
   // Fails to compile where a field is added: add it here, too.
-  const auto& [cells, cell_size, size_factors, include, exclude, tip_bones, symmetry, construction,
-               max_retries, min_dihedral_degrees, min_scaled_jacobian] = options;
+  const auto& [cells, cell_size, size_factors, coarsen_rigid, include, exclude, tip_bones, symmetry,
+               construction, max_retries, min_dihedral_degrees, min_scaled_jacobian] = options;
   hash.add(cells);
   hash.add(cell_size ? 1 : 0);
   hash.add(cell_size.value_or(0.0));
@@ -75,6 +75,7 @@ void add_options(Hash& hash, const lattice::BuildOptions& options) {
     hash.add(size.joint);
     hash.add(size.factor);
   }
+  hash.add(static_cast<int>(coarsen_rigid));
   for (const std::vector<int>* joints : {&include, &exclude}) {
     hash.add(static_cast<int>(joints->size()));
     for (int joint : *joints) hash.add(joint);

@@ -39,11 +39,15 @@ struct Draft {
 Halves halves(const RigInput& input) { return input.mirror ? Halves::OneMirrored : Halves::Both; }
 
 Draft make_draft(const RigInput& input, double h, const Attempt& attempt, const SkinSamples& samples) {
+  ReductionOptions reduction = attempt.reduction;
+  reduction.sizes = &input.sizes;
+  PointOptions options = attempt.points;
+  options.sizes = &input.sizes;
   Draft draft;
-  draft.skeleton = reduce_skeleton(input.unit_skin, input.unit_joints, input.weights, h, attempt.reduction,
-                                   input.mirror_joint());
-  draft.points = place_points(input.unit_skin, draft.skeleton, h, attempt.points);
-  draft.cells = tetrahedralise(draft.points, draft.skeleton, samples, h, attempt.points).cells;
+  draft.skeleton =
+      reduce_skeleton(input.unit_skin, input.unit_joints, input.weights, h, reduction, input.mirror_joint());
+  draft.points = place_points(input.unit_skin, draft.skeleton, h, options);
+  draft.cells = tetrahedralise(draft.points, draft.skeleton, samples, h, options).cells;
   return draft;
 }
 
@@ -56,7 +60,7 @@ double smallest_edge_length(const RigInput& input, int wanted) {
   double h = 0.5;
   const auto grid_points = [&] { return (box.array() + 2.4 * h).prod() / (h * h * h); };
   while (grid_points() < 100.0 * wanted) h *= 0.9;
-  return h;
+  return h / input.sizes.largest();
 }
 
 /// Secant search, in logarithms, for the h that gives the wanted number of cells.
@@ -67,7 +71,8 @@ double find_edge_length(const RigInput& input, int wanted, const Attempt& attemp
   double old_x = 0.0, old_y = 0.0, slope = -2.3;  // cells go like h^-3 in a bulk, h^-2 in a skin
   for (int step = 0; step < kSearchSteps; ++step) {
     const double h = std::exp(x);
-    const Draft draft = make_draft(input, h, attempt, sample_skin(input.unit_skin, h, halves(input)));
+    const Draft draft =
+        make_draft(input, h, attempt, sample_skin(input.unit_skin, h, halves(input), input.sizes));
     const std::size_t cells = draft.cells.size() * (draft.points.half ? 2 : 1);
     const double y = std::log(static_cast<double>(std::max<std::size_t>(1, cells)));
     if (std::abs(y - target) < best_error) best_error = std::abs(y - target), best_x = x;
@@ -138,14 +143,26 @@ ControlLattice to_lattice(const RigInput& input, const Draft& draft, double h) {
   return lattice;
 }
 
+/// [m], over the cells.
+double mean_target_edge(const RigInput& input, const ControlLattice& lattice, double h) {
+  double sum = 0.0;
+  for (const Cell& cell : lattice.complex.cells) {
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 4; ++k) middle += 0.25 * lattice.complex.points.row(cell.vertices[k]).transpose();
+    sum += input.sizes.edge_at(input.unit_skin.to_unit(middle), h);
+  }
+  return input.unit_skin.scale * sum / static_cast<double>(lattice.complex.cells.size());
+}
+
 ControlLattice make_attempt(const RigInput& input, double h, const Attempt& attempt) {
-  const SkinSamples samples = sample_skin(input.unit_skin, h, halves(input));
+  const SkinSamples samples = sample_skin(input.unit_skin, h, halves(input), input.sizes);
   Draft draft = make_draft(input, h, attempt, samples);
-  optimise(draft.points, draft.cells, draft.skeleton, input.unit_skin, samples, h);
+  optimise(draft.points, draft.cells, draft.skeleton, input.unit_skin, samples, h, input.sizes);
   if (draft.points.half) add_mirror_image(draft);
   ControlLattice lattice = to_lattice(input, draft, h);
   separate_limbs(input, draft.skeleton, lattice);
   hang_joints(input, draft.skeleton, lattice);
+  if (!input.sizes.is_uniform()) lattice.edge_length = mean_target_edge(input, lattice, h);
   return lattice;
 }
 
@@ -242,8 +259,6 @@ BuildResult best_attempt_of(const RigInput& input, const BuildOptions& options) 
 
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
   options.validate();
-  if (!options.size_factors.empty())
-    throw std::invalid_argument("size_factors: cells are of one size everywhere; hint: choose cell_size");
   BuildOptions whole = options;
   whole.symmetry = Symmetry::Off;
   if (options.construction == Construction::Grid) {

@@ -10,10 +10,11 @@
 
 namespace sinew::lattice {
 
-/// Cells round the bones of one joint are this much larger (> 1) or smaller (< 1) than elsewhere.
+/// Cells in the flesh of one joint (round its skin and its bones) are this much larger (> 1) or smaller (< 1)
+/// than elsewhere.
 struct SizeFactor {
   int joint = -1;       ///< index into the joint tree.
-  double factor = 1.0;  ///< target edge there over the lattice's target edge [-]; in [0.2, 5].
+  double factor = 1.0;  ///< target edge there over the lattice's target edge [-]; in [0.25, 4].
 };
 
 /// Whether leaf joints that carry skin get a bone of their own.
@@ -29,15 +30,23 @@ enum class Construction {
   Grid         ///< of cubes, with soft bones.
 };
 
+/// Whether cells are larger where the skin moves as one stiff piece.
+enum class CoarsenRigid { Off, On };
+
 /// Controls of the lattice builder.
 struct BuildOptions {
   /// Wanted number of cells [-]; >= 20. The secant search on h lands within about 10 %.
   int cells = 1000;
   /// Target edge h [m]; > 0. Where it is given, `cells` is not used and nothing is searched.
   std::optional<double> cell_size = std::nullopt;
-  /// Finer and coarser places. A joint may be named once. build() makes cells of one size everywhere so far
-  /// and refuses factors.
+  /// Finer and coarser places. A joint may be named once. Away from a finer place the target edge grows by
+  /// 0.35 per length, so that neighbouring cells differ little. Of no effect at joints that carry no skin and
+  /// where only a grid of cubes passes the gate.
   std::vector<SizeFactor> size_factors = {};
+  /// With On, skin that follows one frame alone, and the flesh under it, gets cells twice as large as
+  /// `size_factors` say, the farther from joints and blended weights the nearer to that. Off, as such skin
+  /// does not bend with its bones but still swings on them, and a coarse lattice is stiffer.
+  CoarsenRigid coarsen_rigid = CoarsenRigid::Off;
   /// Joints that take part: where not empty, all others are treated as excluded.
   std::vector<int> include = {};
   /// Joints that get neither a bone nor a frame: their children hang on the joint above, and so does their

@@ -10,7 +10,7 @@
 namespace sinew::lattice {
 namespace {
 
-constexpr double kSmallestFactor = 0.2, kLargestFactor = 5.0;
+constexpr double kSmallestFactor = 0.25, kLargestFactor = 4.0;
 
 void require(bool holds, const char* field, auto value, const char* expected) {
   if (!holds) throw std::invalid_argument(fmt::format("{}: got {}, expected {}", field, value, expected));
@@ -40,7 +40,7 @@ void BuildOptions::validate() const {
   for (const SizeFactor& size : size_factors) {
     require(size.joint >= 0, "size_factors", size.joint, "the index of a joint");
     require(size.factor >= kSmallestFactor && size.factor <= kLargestFactor, "size_factors", size.factor,
-            "a factor in [0.2, 5]");
+            "a factor in [0.25, 4]");
     require(sized.insert(size.joint).second, "size_factors", size.joint, "every joint at most once");
   }
   for (const int joint : include) require(joint >= 0, "include", joint, "the index of a joint");

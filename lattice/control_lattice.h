@@ -116,7 +116,7 @@ struct ControlLattice {
   /// For every joint of the tree: the frame (a joint index that owns a bone or a soft frame) that its skin
   /// weight counts for; -1 where there is none at all.
   std::vector<int> frame_of_joint;
-  double edge_length = 0.0;  ///< target edge h [m].
+  double edge_length = 0.0;  ///< target edge h [m]; where sizes vary, its mean over the cells.
   /// A plain grid of cubes, all bones soft: the builder's last resort.
   bool is_grid = false;
   int retries = 0;  ///< how many attempts the gate refused.

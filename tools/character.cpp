@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -113,23 +114,6 @@ std::vector<Eigen::Affine3d> Character::pose(double time) const {
   return skeleton::pose_from_rest(rig.skeleton, skeleton::sample(rig.skeleton, the_clip(), time));
 }
 
-namespace {
-
-std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::vector<std::string>& names,
-                           const std::string& where) {
-  std::vector<int> joints;
-  for (const std::string& pattern : patterns) {
-    const std::vector<int> found = matching(pattern, names);
-    if (found.empty()) throw assets::ConfigError(where + ": " + no_such_bone(pattern, names));
-    joints.insert(joints.end(), found.begin(), found.end());
-  }
-  std::sort(joints.begin(), joints.end());
-  joints.erase(std::unique(joints.begin(), joints.end()), joints.end());
-  return joints;
-}
-
-}  // namespace
-
 lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::string>& joints) {
   lattice::BuildOptions options;
   options.cells = scene.cells;
@@ -138,6 +122,13 @@ lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::s
   options.exclude = joints_of(scene.bones_exclude, joints, "bones_exclude");
   options.tip_bones = scene.tip_bones == Switch::On ? lattice::TipBones::On : lattice::TipBones::Off;
   options.symmetry = scene.symmetry == Switch::On ? lattice::Symmetry::Auto : lattice::Symmetry::Off;
+  options.coarsen_rigid =
+      scene.coarsen_rigid == Switch::On ? lattice::CoarsenRigid::On : lattice::CoarsenRigid::Off;
+  std::map<int, double> factors;
+  for (std::size_t i = 0; i < scene.sizes.size(); ++i)
+    for (const int joint : joints_of(scene.sizes[i].bones, joints, fmt::format("size {}", i + 1)))
+      factors[joint] = scene.sizes[i].factor;
+  for (const auto& [joint, factor] : factors) options.size_factors.push_back({joint, factor});
   return options;
 }
 

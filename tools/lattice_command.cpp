@@ -33,10 +33,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// Keys of a scene that this command knows.
-constexpr std::string_view kKeys[] = {"output",        "overwrite",     "json",           "preview",
-                                      "lattice",       "lattice_space", "snap_tolerance", "soft_bones",
-                                      "cache",         "cells",         "cell_size",      "bones_include",
-                                      "bones_exclude", "tip_bones",     "symmetry",       "height"};
+constexpr std::string_view kKeys[] = {
+    "output",         "overwrite",  "json",     "preview",       "lattice",   "lattice_space",
+    "snap_tolerance", "soft_bones", "cache",    "cells",         "cell_size", "bones_include",
+    "bones_exclude",  "tip_bones",  "symmetry", "coarsen_rigid", "height"};
 
 Json to_json(const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
@@ -45,6 +45,12 @@ std::string picture_name(const LatticeRequest& request) { return request.scene.o
 void check_request(const LatticeRequest& request) {
   const Scene& scene = request.scene;
   scene.validate();
+  if (scene.plain)
+    throw assets::ConfigError(
+        scene.source.path +
+        ": is a box without a rig, expected a rig; hint: sinew simulate writes the lattice");
+  if (scene.rig.empty())
+    throw assets::ConfigError(scene.source.path + ": rig is missing; hint: rig = \"character.glb\"");
   if (scene.output.empty())
     throw assets::ConfigError("--output: missing, expected a lattice file to write; hint: -o character.vtu");
   assets::lattice_format(scene.output, request.format);
@@ -120,13 +126,21 @@ void print_summary(const std::string& output, const lattice::BuildResult& result
     fmt::print(stderr, "  limbs: {} places are shared and have a cell for each limb, {} in all\n",
                places.size(), lattice.copies.size());
   }
+  if (result.mirror) {
+    const Eigen::Vector3d& n = result.mirror->normal;
+    fmt::print(stderr, "  symmetry: mirrored in a plane with the normal ({:.3g}, {:.3g}, {:.3g})\n", n.x(),
+               n.y(), n.z());
+  } else if (!result.no_mirror.empty()) {
+    fmt::print(stderr, "  symmetry: none, as {}\n", single_line(result.no_mirror));
+  }
   for (const lattice::SkeletonChange& change : lattice.changes)
     fmt::print(stderr, "  {}: {}: {}\n", single_line(change.joint), change.what, single_line(change.reason));
 }
 
 }  // namespace
 
-std::string lattice_report(const lattice::ControlLattice& lattice, const lattice::JointTree& joints) {
+std::string lattice_report(const lattice::BuildResult& result, const lattice::JointTree& joints) {
+  const lattice::ControlLattice& lattice = result.lattice;
   Json json;
   json["vertices"] = Json::array();
   for (Eigen::Index v = 0; v < lattice.complex.points.rows(); ++v)
@@ -164,6 +178,10 @@ std::string lattice_report(const lattice::ControlLattice& lattice, const lattice
     places.insert(copy.place);
   }
   json["separation"] = {{"shared_places", places.size()}, {"cells_in_them", lattice.copies.size()}};
+  json["symmetry"] = {{"mirrored", result.mirror.has_value()}, {"why_not", result.no_mirror}};
+  if (result.mirror)
+    json["symmetry"]["plane"] = {{"normal", to_json(result.mirror->normal)},
+                                 {"offset", result.mirror->offset}};
   json["changes"] = Json::array();
   for (const lattice::SkeletonChange& change : lattice.changes)
     json["changes"].push_back({{"joint", change.joint}, {"what", change.what}, {"reason", change.reason}});
@@ -251,7 +269,7 @@ void run_lattice(const LatticeRequest& request) {
   write_outputs(request, lattice, input);
   if (built.use == assets::CacheUse::Built)
     assets::keep_lattice(assets::cache_folder(scene.output), built.key, built.result, input.joints);
-  if (scene.json) std::cout << lattice_report(lattice, input.joints);
+  if (scene.json) std::cout << lattice_report(built.result, input.joints);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   print_summary(scene.output, built.result, elapsed.count());
 }
@@ -261,13 +279,23 @@ void add_lattice_command(CLI::App& app, CommandContext&) {
   auto flags = std::make_shared<SceneFlags>();
   CLI::App* command =
       app.add_subcommand("lattice", "Build, check or convert the control lattice of a rig and look at it.");
-  command->add_option("RIG", request->scene.rig, "the character: glTF, FBX, Collada, ...")->required();
+  auto file = std::make_shared<std::string>();
+  command
+      ->add_option("input", *file, "the character: glTF, FBX, Collada, ..., or a scene file (.toml) about it")
+      ->type_name("SCENE.toml|RIG")
+      ->required();
   flags->add_to(*command, kKeys);
   command->add_option(
       "--format", request->format,
       "vtk, vtk-binary, msh41, msh41-binary, msh22 or msh22-binary, where the extension of the "
       "output (.vtu, .vtk, .msh, .mesh, .node, .ele, .veg) leaves a choice");
-  command->callback([request, flags] {
+  command->callback([request, flags, file] {
+    if (is_scene_file(*file)) {
+      request->scene = read_scene(*file);
+      request->scene.output.clear();  // there it is the folder of a run
+    } else {
+      request->scene.rig = *file;
+    }
     flags->apply(request->scene);
     run_lattice(*request);
   });

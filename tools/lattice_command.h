@@ -23,7 +23,7 @@ struct LatticeRequest {
 void run_lattice(const LatticeRequest& request);
 
 /// The JSON of --json: vertices [m], cells, bones with their chains, tip and soft bones, soft frames, changes
-/// to the skeleton, quality.
-std::string lattice_report(const lattice::ControlLattice& lattice, const lattice::JointTree& joints);
+/// to the skeleton, symmetry, quality.
+std::string lattice_report(const lattice::BuildResult& result, const lattice::JointTree& joints);
 
 }  // namespace sinew::tools

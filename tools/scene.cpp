@@ -1,6 +1,7 @@
 #include "tools/scene.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -42,12 +43,16 @@ std::string print_material(const BoneMaterial& material) {
   return text;
 }
 
+std::string print_size(const BoneSize& size) {
+  return fmt::format("\n[[size]]\nbones = {}\nfactor = {}\n", toml_quoted(size.bones, "bones"), size.factor);
+}
+
 /// Keys that say something about a rig; a plain scene has none of them.
 bool is_of_characters(std::string_view key) {
   constexpr std::string_view kKeys[] = {
-      "rig",      "clip",   "lattice",      "lattice_space", "snap_tolerance", "soft_bones",
-      "cache",    "cells",  "cell_size",    "bones_include", "bones_exclude",  "tip_bones",
-      "symmetry", "height", "output_space", "output_mesh"};
+      "rig",      "clip",          "lattice",   "lattice_space", "snap_tolerance", "soft_bones",
+      "cache",    "cells",         "cell_size", "bones_include", "bones_exclude",  "tip_bones",
+      "symmetry", "coarsen_rigid", "height",    "output_space",  "output_mesh"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 
@@ -61,6 +66,10 @@ void check_plain(const Scene& scene) {
                     "[lattice] holds its size and its cells",
                     field.key, flag_text(scene, field)));
   }
+  if (!scene.sizes.empty()) {
+    throw assets::ConfigError(
+        "[[size]]: expected none as the scene is a box without a rig; hint: [lattice] holds its cells");
+  }
   if (!scene.young) {
     throw assets::ConfigError(
         "young: missing, expected Young's modulus in pascal as the scene is a box without a rig; "
@@ -70,13 +79,19 @@ void check_plain(const Scene& scene) {
 
 /// A lattice that is read is not built.
 void check_no_builder_keys(const Scene& scene) {
-  for (const char* key : {"cell_size", "bones_include", "bones_exclude"}) {
+  const Scene defaults;
+  for (const char* key : {"cell_size", "bones_include", "bones_exclude", "coarsen_rigid"}) {
     const SceneField& field = *find_scene_field(key);
-    if (flag_text(scene, field).empty()) continue;
+    if (flag_text(scene, field) == flag_text(defaults, field)) continue;
     throw assets::ConfigError(
         fmt::format("{}: got {}, expected nothing as the lattice is read from {}; hint: leave one "
                     "of the two out",
                     key, flag_text(scene, field), scene.lattice));
+  }
+  if (!scene.sizes.empty()) {
+    throw assets::ConfigError(
+        fmt::format("[[size]]: expected none as the lattice is read from {}; hint: leave one of the two out",
+                    scene.lattice));
   }
 }
 
@@ -92,6 +107,11 @@ void Scene::validate() const {
   for (const SceneField& field : scene_fields()) check_field(*this, field, std::string(field.key));
   if (plain) check_plain(*this);
   if (!lattice.empty()) check_no_builder_keys(*this);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const std::string where = fmt::format("size {}", i + 1);
+    if (sizes[i].bones.empty()) throw assets::ConfigError(where + ": no bones, expected at least one name");
+    check_number(size_factor_field(), sizes[i].factor, where + ": factor");
+  }
   for (std::size_t i = 0; i < materials.size(); ++i) {
     const std::string where = fmt::format("material {}", i + 1);
     if (materials[i].bones.empty())
@@ -101,6 +121,14 @@ void Scene::validate() const {
         check_number(*field, *(materials[i].*member), fmt::format("{}: {}", where, field->key));
     }
   }
+}
+
+bool is_scene_file(const std::string& file) {
+  std::string extension = std::filesystem::path(file).extension().string();
+  for (char& letter : extension) {
+    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  return extension == ".toml";
 }
 
 std::string print_scene(const Scene& scene) {
@@ -113,6 +141,7 @@ std::string print_scene(const Scene& scene) {
         value.empty() ? fmt::format("# {} =\n", field.key) : fmt::format("{} = {}\n", field.key, value));
   }
   if (scene.plain) text += print_plain_scene(*scene.plain);
+  for (const BoneSize& size : scene.sizes) text += print_size(size);
   for (const BoneMaterial& material : scene.materials) text += print_material(material);
   return text;
 }
@@ -141,6 +170,19 @@ std::string no_such_bone(const std::string& pattern, const std::vector<std::stri
   return fmt::format("no bone is named '{}', expected one of {}{}", pattern,
                      fmt::join(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
                      names.size() > shown ? fmt::format(" and {} more", names.size() - shown) : "");
+}
+
+std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::vector<std::string>& names,
+                           const std::string& where) {
+  std::vector<int> joints;
+  for (const std::string& pattern : patterns) {
+    const std::vector<int> found = matching(pattern, names);
+    if (found.empty()) throw assets::ConfigError(where + ": " + no_such_bone(pattern, names));
+    joints.insert(joints.end(), found.begin(), found.end());
+  }
+  std::sort(joints.begin(), joints.end());
+  joints.erase(std::unique(joints.begin(), joints.end()), joints.end());
+  return joints;
 }
 
 std::vector<int> material_of_bone(const Scene& scene, const std::string& rig_file,

@@ -41,6 +41,15 @@ struct BoneMaterial {
   friend bool operator==(const BoneMaterial&, const BoneMaterial&) = default;
 };
 
+/// Cells that are finer or coarser in the flesh of some bones: `[[size]]` in a scene file.
+struct BoneSize {
+  /// As BoneMaterial::bones, of the rig's joints.
+  std::vector<std::string> bones;
+  double factor = 1.0;  ///< on the length of edges [-]; 0.25 ... 4.
+
+  friend bool operator==(const BoneSize&, const BoneSize&) = default;
+};
+
 /// Where something was read from; no part of what it says.
 struct SourceFile {
   std::string path;  ///< as the user gave it; empty: nowhere.
@@ -89,6 +98,10 @@ struct Scene {
   Switch tip_bones = Switch::On;
   /// A mirror-symmetric rig gets a mirror-symmetric lattice; off: nobody looks.
   Switch symmetry = Switch::On;
+  /// Larger cells where the skin follows one bone alone, away from joints.
+  Switch coarsen_rigid = Switch::Off;
+  /// Cells of another size round some bones; a later one overrides an earlier one.
+  std::vector<BoneSize> sizes;
   /// Finest active level of the hierarchy [-]; 0 ... 3. 1, as tetrahedra of level 0 alone are far too stiff.
   int levels = 1;
 
@@ -139,6 +152,9 @@ struct Scene {
   friend bool operator==(const Scene&, const Scene&) = default;
 };
 
+/// By its extension, .toml.
+bool is_scene_file(const std::string& file);
+
 /// Reads a scene file (TOML). Strict: an unknown key is an error that names the nearest valid one, types are
 /// not converted, values are checked. Keys left out keep the values of Scene. Paths in it are relative to its
 /// own directory. Throws assets::ConfigError "<file>:<line>: ...", assets::IoError where it cannot be read.
@@ -154,6 +170,11 @@ std::vector<int> matching(const std::string& pattern, const std::vector<std::str
 
 /// One sentence for a pattern that fits none of them: the nearest, or the first of all.
 std::string no_such_bone(const std::string& pattern, const std::vector<std::string>& names);
+
+/// The joints that any of the patterns fits, ascending. Throws assets::ConfigError, opened by `where`, for a
+/// pattern that fits none, naming the nearest.
+std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::vector<std::string>& names,
+                           const std::string& where);
 
 /// For every bone the index of its material in scene.materials, or -1 for the scene's own. Throws
 /// assets::InputError (for `rig_file`) where a pattern fits no bone.

@@ -60,6 +60,8 @@ constexpr auto kFields = std::to_array<SceneField>({
      "joints that have none; what hangs on them hangs on the joint above"},
     {"tip_bones", &Scene::tip_bones, "on or off: bones for weighted joints without children"},
     {"symmetry", &Scene::symmetry, "on or off: a mirror-symmetric lattice for a mirror-symmetric rig"},
+    {"coarsen_rigid", &Scene::coarsen_rigid,
+     "on or off: larger cells where the skin follows one bone alone, away from joints"},
     {"levels", &Scene::levels, "finest active level of the hierarchy", "levels", {0, 3}, "", "1"},
     {"young",
      &Scene::young,
@@ -111,6 +113,11 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"output_mesh", PathMember{&Scene::output_mesh},
      "mesh (OBJ, PLY) whose vertex order the output takes over"},
 });
+
+/// Of a table; no field of a scene.
+constexpr SceneField kSizeFactor{
+    "factor", SceneMember{}, "length of the cells' edges there over that elsewhere", "factor", {0.25, 4.0},
+    "",       "0.5"};
 
 const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
 const std::vector<std::string> kPrecisionNames{"double", "float"};          // in the enum's order
@@ -247,6 +254,8 @@ std::optional<double> parse_number(std::string_view text) {
 }
 
 std::span<const SceneField> scene_fields() { return kFields; }
+
+const SceneField& size_factor_field() { return kSizeFactor; }
 
 const SceneField* find_scene_field(std::string_view key) {
   const auto found =

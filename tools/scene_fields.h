@@ -58,6 +58,9 @@ struct MaterialValue {
 };
 std::vector<MaterialValue> material_values();
 
+/// The key `factor` of [[size]].
+const SceneField& size_factor_field();
+
 /// In the order of a printed scene.
 std::span<const SceneField> scene_fields();
 

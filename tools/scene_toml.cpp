@@ -72,6 +72,10 @@ class SceneReader : public detail::TomlReader {
       read_tables(node, key, [&](const toml::table& table, const std::string& where) {
         scene_.materials.push_back(material(table, where));
       });
+    } else if (key == "size") {
+      read_tables(node, key, [&](const toml::table& table, const std::string& where) {
+        scene_.sizes.push_back(size(table, where));
+      });
     } else if (std::find(plain_keys.begin(), plain_keys.end(), key) != plain_keys.end() &&
                (key != "lattice" || node.is_table())) {
       if (!scene_.plain) scene_.plain.emplace();
@@ -110,6 +114,7 @@ class SceneReader : public detail::TomlReader {
     if (field == nullptr) {
       std::vector<std::string> keys = detail::plain_scene_keys();
       keys.emplace_back("material");
+      keys.emplace_back("size");
       for (const SceneField& known : scene_fields()) keys.emplace_back(known.key);
       std::sort(keys.begin(), keys.end());
       keys.erase(std::unique(keys.begin(), keys.end()), keys.end());  // a lattice is a file or a box
@@ -176,6 +181,26 @@ class SceneReader : public detail::TomlReader {
                       place(table), where));
     }
     return material;
+  }
+
+  BoneSize size(const toml::table& table, const std::string& where) const {
+    BoneSize size;
+    bool has_factor = false;
+    read_table(
+        table, where,
+        {{"bones", [&](const toml::node& node, const std::string& at) { size.bones = strings(node, at); }},
+         {"factor", [&](const toml::node& node, const std::string& at) {
+            size.factor = number(node, at, range_text(size_factor_field()));
+            check_number(size_factor_field(), size.factor, at);
+            has_factor = true;
+          }}});
+    if (size.bones.empty() || !has_factor) {
+      throw ConfigError(
+          fmt::format("{}: {}: no {}, expected bones and a factor; hint: bones = [\"belly*\"], "
+                      "factor = 0.5",
+                      place(table), where, size.bones.empty() ? "bones" : "factor"));
+    }
+    return size;
   }
 
   std::string file_;

@@ -1,7 +1,5 @@
 #include "tools/simulate_options.h"
 
-#include <filesystem>
-
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -10,18 +8,6 @@
 #include "assets/error.h"
 
 namespace sinew::tools {
-namespace {
-
-bool is_scene_file(const std::string& file) {
-  std::string extension = std::filesystem::path(file).extension().string();
-  for (char& letter : extension) {
-    if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
-  }
-  return extension == ".toml";
-}
-
-}  // namespace
-
 void SimulateOptions::add_to(CLI::App& command) {
   command.add_option("input", input_, "scene file (.toml), or a rig: glTF, GLB, FBX, Collada, ...")
       ->type_name("SCENE.toml|RIG");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "lattice/detail/graded_points.h"
 #include "lattice/detail/segments.h"
 
 namespace sinew::lattice::detail {
@@ -20,7 +21,33 @@ constexpr double kMiddleBall = 0.51;
 /// Bone pieces are looked for this far away, in units of h.
 constexpr double kClearanceReach = 2.0;
 
-void place_bones(const ReducedSkeleton& skeleton, double h, LatticePoints& out) {
+/// Parameters of the samples on a bone from a to b: 1.1 h apart.
+std::vector<double> bone_samples(const Vector3d& a, const Vector3d& b, double h,
+                                 const PointOptions& options) {
+  const double length = (b - a).norm();
+  std::vector<double> samples;
+  if (options.is_uniform()) {
+    const int pieces = std::max(1, static_cast<int>(std::lround(length / (kBoneSpacing * h))));
+    for (int i = 1; i < pieces; ++i) samples.push_back(static_cast<double>(i) / pieces);
+    return samples;
+  }
+  constexpr int kSteps = 64;
+  std::vector<double> pieces_until(kSteps + 1, 0.0);  // from the start, fractions of pieces included
+  for (int i = 0; i < kSteps; ++i) {
+    const double s = (i + 0.5) / kSteps, edge = options.edge_at((1.0 - s) * a + s * b, h);
+    pieces_until[i + 1] = pieces_until[i] + length / kSteps / (kBoneSpacing * edge);
+  }
+  const int pieces = std::max(1, static_cast<int>(std::lround(pieces_until.back())));
+  for (int i = 1, step = 0; i < pieces; ++i) {
+    const double wanted = pieces_until.back() * i / pieces;
+    while (pieces_until[step + 1] < wanted) ++step;
+    const double share = (wanted - pieces_until[step]) / (pieces_until[step + 1] - pieces_until[step]);
+    samples.push_back((step + share) / kSteps);
+  }
+  return samples;
+}
+
+void place_bones(const ReducedSkeleton& skeleton, double h, const PointOptions& options, LatticePoints& out) {
   const auto is_placed = [&](const ReducedBone& bone) {
     const bool other_half = out.half && (skeleton.nodes[bone.start].position.x() < 0.0 ||
                                          skeleton.nodes[bone.end].position.x() < 0.0);
@@ -37,13 +64,10 @@ void place_bones(const ReducedSkeleton& skeleton, double h, LatticePoints& out) 
   for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
     const ReducedBone& bone = skeleton.bones[b];
     if (!is_placed(bone)) continue;
-    const double length = (skeleton.nodes[bone.end].position - skeleton.nodes[bone.start].position).norm();
-    const int pieces = std::max(1, static_cast<int>(std::lround(length / (kBoneSpacing * h))));
+    const Vector3d start = skeleton.nodes[bone.start].position, end = skeleton.nodes[bone.end].position;
     out.chains[b].push_back(vertex_of_node[bone.start]);
-    for (int i = 1; i < pieces; ++i) {
-      const double s = static_cast<double>(i) / pieces;
+    for (const double s : bone_samples(start, end, h, options))
       out.chains[b].push_back(out.add(point_on_bone(skeleton, b, s), {.bone = b, .s = s, .fixed = false}));
-    }
     out.chains[b].push_back(vertex_of_node[bone.end]);
   }
 }
@@ -59,9 +83,9 @@ BoneClearance::BoneClearance(const LatticePoints& points, double h, const PointO
   for (const std::vector<int>& chain : points.chains)
     for (std::size_t i = 1; i < chain.size(); ++i) {
       const Vector3d a = points.points[chain[i - 1]], b = points.points[chain[i]];
-      const double length = (b - a).norm();
+      const double length = (b - a).norm(), edge = options.edge_at(0.5 * (a + b), h);
       pieces_.push_back(
-          {a, b, options.exclusion * std::min(h, std::max(length, 0.5 * h)), kMiddleBall * length});
+          {a, b, options.exclusion * std::min(edge, std::max(length, 0.5 * edge)), kMiddleBall * length});
     }
   if (pieces_.empty()) return;
   side_ = kClearanceReach * h;
@@ -114,8 +138,12 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
                            const PointOptions& options) {
   LatticePoints out;
   out.half = !skeleton.mirror_bone.empty();
-  place_bones(skeleton, h, out);
+  place_bones(skeleton, h, options, out);
   const BoneClearance clearance(out, h, options);
+  if (!options.is_uniform()) {
+    place_graded_points(skin, clearance, *options.sizes, h, options.shift, out);
+    return out;
+  }
   // Cubes of side 2h/sqrt(3) with a point in the middle: neighbours along a diagonal are h apart.
   const double side = 2.0 * h / std::sqrt(3.0);
   const Vector3d reach = skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() + kGridReach * h;

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "lattice/detail/cell_sizes.h"
 #include "lattice/detail/skeleton_reduction.h"
 #include "lattice/detail/unit_skin.h"
 
@@ -37,8 +38,14 @@ Eigen::Vector3d point_on_bone(const ReducedSkeleton& skeleton, int bone, double 
 
 /// How free points keep away from the bones.
 struct PointOptions {
-  double exclusion = 0.62;  ///< in units of min(h, max(l, h/2)), l the length of the bone piece.
-  double shift = 0.0;       ///< of the grid, along all axes, in units of the side of its cubes.
+  double exclusion = 0.62;           ///< in units of min(h, max(l, h/2)), l the length of the bone piece.
+  double shift = 0.0;                ///< of the grid, along all axes, in units of the side of its cubes.
+  const CellSizes* sizes = nullptr;  ///< h of every place; null: the same everywhere.
+
+  double edge_at(const Eigen::Vector3d& p, double h) const {
+    return sizes == nullptr ? h : sizes->edge_at(p, h);
+  }
+  bool is_uniform() const { return sizes == nullptr || sizes->is_uniform(); }
 };
 
 /// True where a free point would come too close to a piece of some bone: the ball about the middle of each
@@ -67,7 +74,7 @@ class BoneClearance {
 };
 
 /// Joints, bone samples every 1.1 h, and a body-centred cubic grid of nearest distance h, symmetric about the
-/// origin, inside the skin and within 1.2 h of it. Of a mirrored
+/// origin, inside the skin and within 1.2 h of it; where sizes vary, place_graded_points. Of a mirrored
 /// skeleton the half x >= 0 alone, with points on the plane.
 LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton, double h,
                            const PointOptions& options);

@@ -8,6 +8,7 @@
 
 #include "lattice/detail/cell_locator.h"
 #include "lattice/detail/segments.h"
+#include "lattice/detail/symmetry.h"
 #include "lattice/detail/triangle_grid.h"
 #include "lattice/limb_copies.h"
 
@@ -99,7 +100,8 @@ LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const C
   std::vector<Label> labels(lattice.complex.cells.size());
   label_skin(labels, faces);
   label_bones(labels);
-  for (const Label& label : labels) limbs_.push_back(gather(label));
+  for (std::size_t c = 0; c < labels.size(); ++c)
+    limbs_.push_back(gather(labels[c], edge_at(lattice.complex.cells[c].vertices)));
 }
 
 LimbPiece LimbMap::piece_at(int frame, const Vector3d& p) const {
@@ -223,7 +225,7 @@ void LimbMap::label_bones(std::vector<Label>& labels) const {
   }
 }
 
-std::vector<Limb> LimbMap::gather(const Label& label) const {
+std::vector<Limb> LimbMap::gather(const Label& label, double edge) const {
   std::vector<LimbPiece> pieces = label.pieces;
   std::sort(pieces.begin(), pieces.end(), is_before);
   const int n = static_cast<int>(pieces.size());
@@ -241,7 +243,8 @@ std::vector<Limb> LimbMap::gather(const Label& label) const {
   for (int i = 0; i < n; ++i)
     for (int k = i + 1; k < n; ++k) {
       const int a = root(i), b = root(k);
-      if (a != b && (are_together({pieces[i]}, {pieces[k]}) || is_joined(pieces[i].frame, pieces[k].frame)))
+      if (a != b &&
+          (are_together({pieces[i]}, {pieces[k]}, edge) || is_joined(pieces[i].frame, pieces[k].frame)))
         group[std::max(a, b)] = std::min(a, b);
     }
   std::vector<Limb> limbs;
@@ -267,7 +270,22 @@ double LimbMap::distance(const Limb& a, const Limb& b) const {
   return shortest;
 }
 
-bool LimbMap::are_together(const Limb& a, const Limb& b) const { return distance(a, b) < kLimbDistance * h_; }
+bool LimbMap::are_together(const Limb& a, const Limb& b, double edge) const {
+  return distance(a, b) < kLimbDistance * edge;
+}
+
+double LimbMap::edge_at(std::span<const int> vertices) const {
+  if (lattice_.is_grid || input_.sizes.is_uniform()) return h_;
+  double sum = 0.0, count = 0.0;
+  for (const int v : vertices) {
+    if (v < 0) continue;
+    Vector3d p = input_.unit_skin.to_unit(lattice_.complex.points.row(v).transpose());
+    if (input_.mirror && p.x() < 0.0) p = reflected(p);  // so that both sides agree to the last bit
+    sum += input_.sizes.edge_at(p, h_);
+    count += 1.0;
+  }
+  return sum / count;
+}
 
 Limb LimbMap::flesh_at(const Vector3d& p) const {
   const UnitSkin& skin = input_.unit_skin;

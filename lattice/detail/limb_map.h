@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "lattice/control_lattice.h"
@@ -29,7 +30,8 @@ struct LimbPiece {
 using Limb = std::vector<LimbPiece>;
 
 /// Which limbs lie in which cell. Skin and bones in a cell are of one limb if they follow the same frame, if
-/// one triangle of the skin hangs on both, or if they are less than 1.5 h apart along the skeleton.
+/// one triangle of the skin hangs on both, or if they are less than 1.5 h apart along the skeleton, h the
+/// target edge of the place.
 class LimbMap {
  public:
   /// `faces` are those of `lattice.complex`; everything must outlive the map.
@@ -40,7 +42,10 @@ class LimbMap {
   const std::vector<Limb>& limbs(int cell) const { return limbs_[cell]; }
   /// Shortest way along the skeleton, unit coordinates; 0 where they follow the same frame.
   double distance(const Limb& a, const Limb& b) const;
-  bool are_together(const Limb& a, const Limb& b) const;
+  /// Whether they are one limb where the target edge is `edge` (unit coordinates).
+  bool are_together(const Limb& a, const Limb& b, double edge) const;
+  /// Mean target edge at vertices of the lattice (-1: none), unit coordinates.
+  double edge_at(std::span<const int> vertices) const;
   /// Of the flesh at p (unit coordinates, inside the skin): as the closest skin.
   Limb flesh_at(const Eigen::Vector3d& p) const;
   /// Of the bone at a vertex of its chain.
@@ -64,7 +69,7 @@ class LimbMap {
   void add_triangle(Label& label, const std::array<int, 3>& frames, const Eigen::Vector3d& p) const;
   void label_skin(std::vector<Label>& labels, const std::vector<CellFace>& faces) const;
   void label_bones(std::vector<Label>& labels) const;
-  std::vector<Limb> gather(const Label& label) const;
+  std::vector<Limb> gather(const Label& label, double edge) const;
 
   const RigInput& input_;
   const ReducedSkeleton& skeleton_;

@@ -30,7 +30,7 @@ constexpr int kHalvings = 3;
 class Optimiser {
  public:
   Optimiser(LatticePoints& points, const Tetrahedra& cells, const ReducedSkeleton& skeleton,
-            const UnitSkin& skin, const SkinSamples& samples, double h)
+            const UnitSkin& skin, const SkinSamples& samples, double h, const CellSizes& sizes)
       : mesh_(points.points, cells, points.half ? TetMesh::Half::PositiveX : TetMesh::Half::No),
         places_(points.places),
         skeleton_(skeleton),
@@ -38,6 +38,7 @@ class Optimiser {
         samples_(samples.points, 0.4 * h),
         triangles_(samples.triangles),
         h_(h),
+        sizes_(sizes),
         boundary_faces_(mesh_.boundary_faces()) {
     for (const std::vector<int>& chain : points.chains)
       for (std::size_t i = 1; i < chain.size(); ++i) bone_edges_.insert(std::minmax(chain[i - 1], chain[i]));
@@ -74,6 +75,7 @@ class Optimiser {
   SampleGrid samples_;
   const TriangleGrid& triangles_;
   double h_;
+  const CellSizes& sizes_;
   /// Per vertex the other two corners of its boundary faces. Flips and moves keep the faces.
   std::vector<std::vector<std::array<int, 2>>> boundary_faces_;
   EdgeSet bone_edges_;
@@ -142,13 +144,14 @@ bool Optimiser::try_move(int v, const Vector3d& target, double at_least) {
 /// Brings a boundary vertex toward the surface 0.2 h outside the skin.
 void Optimiser::pull(int v) {
   const Vector3d p = mesh_.points[v];
+  const double h = sizes_.edge_at(p, h_);
   const SurfaceQuery::Closest closest = skin_.query.closest(p);
   if (closest.distance < 1e-12) return;
   Vector3d outward = (p - closest.point) / closest.distance;
   if (skin_.is_inside(p)) outward = -outward;
-  Vector3d target = closest.point + kOffset * h_ * outward;
+  Vector3d target = closest.point + kOffset * h * outward;
   if (mesh_.is_in_plane(v)) target.x() = 0.0;
-  if ((target - p).norm() < 0.02 * h_) return;
+  if ((target - p).norm() < 0.02 * h) return;
   const double limit = std::min(mesh_.star_quality(v), kPullQuality) - 1e-12;
   for (const double share : {1.0, 0.5, 0.25})
     if (try_move(v, p + share * (target - p), limit)) return;
@@ -160,7 +163,7 @@ void Optimiser::climb(int v) {
   double quality = mesh_.star_quality(v);
   if (on_boundary(v) && places_[v].bone < 0 && quality > kPullQuality) return;
   LatticePoints::Place& place = places_[v];
-  double step = kFirstStep * h_;
+  double step = kFirstStep * sizes_.edge_at(mesh_.points[v], h_);
   for (int halving = 0; halving <= kHalvings; ++halving, step *= 0.5) {
     if (place.bone >= 0) {
       const ReducedBone& bone = skeleton_.bones[place.bone];
@@ -191,8 +194,8 @@ void Optimiser::climb(int v) {
 }  // namespace
 
 void optimise(LatticePoints& points, Tetrahedra& cells, const ReducedSkeleton& skeleton, const UnitSkin& skin,
-              const SkinSamples& samples, double h) {
-  Optimiser optimiser(points, cells, skeleton, skin, samples, h);
+              const SkinSamples& samples, double h, const CellSizes& sizes) {
+  Optimiser optimiser(points, cells, skeleton, skin, samples, h, sizes);
   optimiser.run();
   points.points = std::move(optimiser.mesh().points);
   points.places = std::move(optimiser.places());

@@ -8,6 +8,6 @@ namespace sinew::lattice::detail {
 /// the boundary to 0.2 h outside the skin, and never lets go of a sample. Joints stay, vertices on bones
 /// slide along them, edges of bones are kept. Moves `points`, replaces `cells`.
 void optimise(LatticePoints& points, Tetrahedra& cells, const ReducedSkeleton& skeleton, const UnitSkin& skin,
-              const SkinSamples& samples, double h);
+              const SkinSamples& samples, double h, const CellSizes& sizes = {});
 
 }  // namespace sinew::lattice::detail

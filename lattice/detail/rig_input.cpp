@@ -56,6 +56,20 @@ std::vector<int> stand_ins(const std::vector<bool>& excluded, const std::vector<
   return frame_of_joint(parents, taking_part);
 }
 
+/// Cells that differ in size between the sides are not mirror images.
+void refuse_lopsided(const std::vector<SizeFactor>& factors, const JointTree& joints, MirrorSearch& search) {
+  std::vector<double> factor(joints.parents.size(), 1.0);
+  for (const SizeFactor& size : factors) factor[size.joint] = size.factor;
+  for (const SizeFactor& size : factors) {
+    const int partner = search.mirror.joint[size.joint];
+    if (partner < 0 || factor[partner] == size.factor) continue;  // without skin it has no size
+    search.found = false;
+    search.why_not =
+        fmt::format("cells are sized by {} at '{}' and by {} at its mirror image '{}'", size.factor,
+                    joints.names[size.joint], factor[partner], joints.names[partner]);
+  }
+}
+
 }  // namespace
 
 RigInput make_rig_input(const Surface& skin, const JointTree& joints, const BuildOptions& options) {
@@ -75,6 +89,7 @@ RigInput make_rig_input(const Surface& skin, const JointTree& joints, const Buil
   MirrorSearch search;
   search.why_not = "symmetry is off";
   if (options.symmetry == Symmetry::Auto) search = find_mirror(unit, unit_joints, weights);
+  if (search.found) refuse_lopsided(options.size_factors, joints, search);
   if (search.found) {
     const MirrorFrame frame = mirror_frame(unit, search.mirror);
     unit = make_unit_skin(skin, &frame);
@@ -83,12 +98,14 @@ RigInput make_rig_input(const Surface& skin, const JointTree& joints, const Buil
     weights = joint_weights(unit, unit_joints, stand_in);
   }
   weights.excluded = excluded;
+  CellSizes sizes = sizes_of_joints(unit, unit_joints, weights, stand_in, options);
   RigInput input{skin,
                  joints,
                  std::move(unit),
                  std::move(unit_joints),
                  std::move(weights),
                  std::move(stand_in),
+                 std::move(sizes),
                  {},
                  std::move(search.why_not)};
   if (search.found) input.mirror = std::move(search.mirror);

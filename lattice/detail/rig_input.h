@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lattice/build.h"
+#include "lattice/detail/cell_sizes.h"
 #include "lattice/detail/skeleton_reduction.h"
 #include "lattice/detail/symmetry.h"
 #include "lattice/detail/unit_skin.h"
@@ -23,6 +24,7 @@ struct RigInput {
   JointWeights weights;
   /// Per joint the one that its skin weight counts for: itself unless it is excluded.
   std::vector<int> stand_in;
+  CellSizes sizes;
   /// Found and wanted: unit coordinates have their plane at x = 0, and unit_joints are exact mirror images.
   std::optional<RigMirror> mirror;
   std::string no_mirror;  ///< why there is none.

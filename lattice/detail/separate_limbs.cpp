@@ -45,8 +45,9 @@ class Separation {
   bool is_single(int cell) const { return first_[cell + 1] - first_[cell] == 1; }
   std::vector<Vector3d> flesh_on(const CellFace& face) const;
   int owner(int cell, const Limb& flesh) const;
-  std::vector<std::vector<int>> parts_at(const std::vector<int>& star, const std::vector<int>& faces) const;
-  bool is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones) const;
+  std::vector<std::vector<int>> parts_at(const std::vector<int>& star, const std::vector<int>& faces,
+                                         double edge) const;
+  bool is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones, double edge) const;
   void split_vertices();
   void rebuild();
 
@@ -109,16 +110,17 @@ int Separation::owner(int cell, const Limb& flesh) const {
 /// same limb, or own the same flesh on the face.
 int Separation::link(const CellFace& face) {
   if (face.second < 0) return kSimple;
+  const double edge = limbs_.edge_at(face.vertices);
   const bool are_single = is_single(face.first) && is_single(face.second);
   if (are_single) {
     const Limb &a = instances_[first_[face.first]].limb, &b = instances_[first_[face.second]].limb;
-    if (a.empty() || b.empty() || limbs_.are_together(a, b) || !flesh_on(face).empty()) return kSimple;
+    if (a.empty() || b.empty() || limbs_.are_together(a, b, edge) || !flesh_on(face).empty()) return kSimple;
   }
   std::set<std::array<int, 2>> links;
   if (!are_single) {
     for (int i = first_[face.first]; i < first_[face.first + 1]; ++i)
       for (int k = first_[face.second]; k < first_[face.second + 1]; ++k)
-        if (limbs_.are_together(instances_[i].limb, instances_[k].limb)) links.insert({i, k});
+        if (limbs_.are_together(instances_[i].limb, instances_[k].limb, edge)) links.insert({i, k});
     for (const Vector3d& p : flesh_on(face)) {
       const Limb flesh = limbs_.flesh_at(p);
       links.insert({owner(face.first, flesh), owner(face.second, flesh)});
@@ -132,7 +134,7 @@ int Separation::link(const CellFace& face) {
 
 /// The instances round a vertex in groups that hang together through faces or belong to one limb.
 std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
-                                                   const std::vector<int>& faces) const {
+                                                   const std::vector<int>& faces, double edge) const {
   std::vector<int> members;
   for (int c : star)
     for (int i = first_[c]; i < first_[c + 1]; ++i) members.push_back(i);
@@ -161,7 +163,8 @@ std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
   const int n = static_cast<int>(members.size());
   for (int i = 0; i < n; ++i)
     for (int k = i + 1; k < n; ++k)
-      if (root(i) != root(k) && limbs_.are_together(instances_[members[i]].limb, instances_[members[k]].limb))
+      if (root(i) != root(k) &&
+          limbs_.are_together(instances_[members[i]].limb, instances_[members[k]].limb, edge))
         join(i, k);
   std::vector<std::vector<int>> parts;
   std::vector<int> part_of(members.size(), -1);
@@ -176,10 +179,10 @@ std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
   return parts;
 }
 
-bool Separation::is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones) const {
+bool Separation::is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones, double edge) const {
   return std::any_of(part.begin(), part.end(), [&](int i) {
     return std::any_of(bones.begin(), bones.end(),
-                       [&](const Limb& bone) { return limbs_.are_together(instances_[i].limb, bone); });
+                       [&](const Limb& bone) { return limbs_.are_together(instances_[i].limb, bone, edge); });
   });
 }
 
@@ -201,10 +204,11 @@ void Separation::split_vertices() {
   std::vector<int> original;  // of each new vertex
   for (int v = 0; v < count; ++v) {
     if (!is_touched_[v]) continue;
-    const std::vector<std::vector<int>> parts = parts_at(stars[v], faces_at[v]);
+    const double edge = limbs_.edge_at({&v, 1});
+    const std::vector<std::vector<int>> parts = parts_at(stars[v], faces_at[v], edge);
     // The vertex stays with every part of its bones' limbs; off the bones with the first part.
     std::vector<bool> stays(parts.size(), false);
-    for (std::size_t p = 0; p < parts.size(); ++p) stays[p] = is_of_bone(parts[p], bones_at[v]);
+    for (std::size_t p = 0; p < parts.size(); ++p) stays[p] = is_of_bone(parts[p], bones_at[v], edge);
     if (std::find(stays.begin(), stays.end(), true) == stays.end()) stays[0] = true;
     for (std::size_t p = 0; p < parts.size(); ++p) {
       if (stays[p]) continue;

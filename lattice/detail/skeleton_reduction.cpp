@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "lattice/detail/cell_sizes.h"
 #include "lattice/detail/segments.h"
 #include "lattice/detail/symmetry.h"
 
@@ -58,6 +59,9 @@ class Reduction {
   Vector3d start(const ReducedBone& b) const { return result_.nodes[b.start].position; }
   Vector3d end(const ReducedBone& b) const { return result_.nodes[b.end].position; }
   double length(const ReducedBone& b) const { return (end(b) - start(b)).norm(); }
+  double h_at(const Vector3d& p) const {
+    return options_.sizes == nullptr ? h_ : options_.sizes->edge_at(p, h_);
+  }
   double metres(double unit_length) const { return unit_length * skin_.scale; }
   void report(int joint, const char* what, std::string reason) {
     result_.changes.push_back({joints_.names[joint], what, std::move(reason)});
@@ -127,9 +131,9 @@ void Reduction::prune() {
 
 bool Reduction::is_cut(int parent, int child, std::string& reason) const {
   const Vector3d a = position(parent), b = position(child);
-  const double bone_length = (b - a).norm();
-  if (bone_length < options_.cut_length * h_) return false;
-  const int n = std::clamp(static_cast<int>(std::ceil(bone_length / (h_ / 8.0))), 8, 64);
+  const double bone_length = (b - a).norm(), h = h_at(b);
+  if (bone_length < options_.cut_length * h) return false;
+  const int n = std::clamp(static_cast<int>(std::ceil(bone_length / (h / 8.0))), 8, 64);
   int outside = 0;
   double farthest = 0.0;
   for (int i = 0; i < n; ++i) {
@@ -138,7 +142,7 @@ bool Reduction::is_cut(int parent, int child, std::string& reason) const {
     ++outside;
     farthest = std::max(farthest, skin_.query.closest(p).distance);
   }
-  if (2 * outside <= n || farthest <= options_.cut_distance * h_) return false;
+  if (2 * outside <= n || farthest <= options_.cut_distance * h) return false;
   reason = fmt::format("{:.0f} % of the bone from '{}' lies outside the skin, up to {:.3g} m away",
                        100.0 * outside / n, joints_.names[parent], metres(farthest));
   return true;
@@ -166,12 +170,12 @@ void Reduction::place_nodes() {
     }
     const SkeletonNode from = result_.nodes[node_of_[parent]];
     const double distance = (position(j) - from.position).norm();
-    if (distance < options_.smallest_bone * h_) {
+    const double smallest = options_.smallest_bone * h_at(position(j));
+    if (distance < smallest) {
       node_of_[j] = node_of_[parent];
       report(j, distance < 1e-6 ? "welded" : "contracted",
              fmt::format("{:.3g} m from '{}', below {:.2g} h = {:.3g} m", metres(distance),
-                         joints_.names[from.joint], options_.smallest_bone,
-                         metres(options_.smallest_bone * h_)));
+                         joints_.names[from.joint], options_.smallest_bone, metres(smallest)));
       continue;
     }
     new_node(j);
@@ -201,7 +205,7 @@ bool Reduction::chain_one_pair() {
       const Vector3d u = (end(shorter) - start(shorter)).normalized(),
                      v = (end(longer) - start(longer)).normalized();
       const double distance = point_segment_distance(end(shorter), start(longer), end(longer));
-      if (u.dot(v) < cosine && distance > options_.too_close * h_) continue;
+      if (u.dot(v) < cosine && distance > options_.too_close * h_at(end(shorter))) continue;
       if (mirror_joint_ != nullptr && end(longer).x() == 0.0 && end(shorter).x() != 0.0) {
         // A bone in the plane of symmetry cannot start at one side.
         soften(
@@ -220,12 +224,12 @@ bool Reduction::chain_one_pair() {
                          std::acos(std::min(1.0, u.dot(v))) * 180.0 / std::numbers::pi, metres(distance),
                          joints_.names[result_.nodes[shorter.end].joint]));
       longer.start = shorter.end;
-      if (length(longer) >= options_.smallest_bone * h_) return true;
+      const double smallest = options_.smallest_bone * h_at(end(longer));
+      if (length(longer) >= smallest) return true;
       const int from = longer.end, to = longer.start;
       report(joint, "contracted",
              fmt::format("{:.3g} m from '{}', below {:.2g} h = {:.3g} m", metres(length(longer)),
-                         joints_.names[result_.nodes[to].joint], options_.smallest_bone,
-                         metres(options_.smallest_bone * h_)));
+                         joints_.names[result_.nodes[to].joint], options_.smallest_bone, metres(smallest)));
       result_.bones.erase(result_.bones.begin() + static_cast<std::ptrdiff_t>(swap ? i : k));
       for (ReducedBone& bone : result_.bones)
         if (bone.start == from) bone.start = to;
@@ -250,12 +254,12 @@ void Reduction::soften(int bone, const std::string& reason) {
 /// instead.
 void Reduction::soften_close_bones() {
   const double cosine = std::cos(options_.chain_degrees * std::numbers::pi / 180.0);
-  const double limit = options_.too_close * h_;
   const int count = static_cast<int>(result_.bones.size());
   for (int i = 0; i < count; ++i)
     for (int k = i + 1; k < count; ++k) {
       const ReducedBone &a = result_.bones[i], &b = result_.bones[k];
       if (a.soft || b.soft || a.start == b.start) continue;
+      const double limit = options_.too_close * h_at(end(a));
       double distance = 0.0;
       if (a.end == b.start || b.end == a.start) {
         const ReducedBone &upper = a.end == b.start ? a : b, &lower = a.end == b.start ? b : a;
@@ -296,7 +300,7 @@ void Reduction::soften_wanted_bones() {
 /// between it and the plane would be flat.
 bool Reduction::is_close_to_image(const Vector3d& a, const Vector3d& b) const {
   if (a.x() == 0.0 && b.x() == 0.0) return false;
-  const double limit = options_.too_close * h_;
+  const double limit = options_.too_close * h_at(b);
   if (a.x() != 0.0) return std::min(a.x(), b.x()) < limit;
   const double to_plane = std::asin((b - a).normalized().x()) * 180.0 / std::numbers::pi;
   return b.x() < limit || 2.0 * to_plane < options_.chain_degrees;
@@ -356,7 +360,7 @@ void Reduction::add_mirror_images() {
 /// Why no bone from a (at `node`) to b can be added; empty where it can.
 std::string Reduction::conflict(const Vector3d& a, const Vector3d& b, int node) const {
   const double cosine = std::cos(options_.chain_degrees * std::numbers::pi / 180.0);
-  const double limit = options_.too_close * h_;
+  const double limit = options_.too_close * h_at(b);
   const Vector3d direction = (b - a).normalized();
   for (const ReducedBone& bone : result_.bones) {
     if (bone.soft) continue;
@@ -380,6 +384,7 @@ bool Reduction::add_tip(int joint, double smallest, const std::vector<double>& v
   if (options_.tip_bones == TipBones::Off) return false;
   const int node = node_of_[joint];
   const Vector3d from = result_.nodes[node].position;
+  const double h = h_at(from);
   Vector3d centroid = Vector3d::Zero();
   double area = 0.0;
   for (std::size_t v = 0; v < vertex_weight.size(); ++v) {
@@ -391,7 +396,7 @@ bool Reduction::add_tip(int joint, double smallest, const std::vector<double>& v
   Vector3d toward = centroid / area - from;
   const bool in_plane = mirror_joint_ != nullptr && (*mirror_joint_)[joint] == joint;
   if (in_plane) toward.x() = 0.0;
-  if (toward.norm() < 0.05 * h_) return false;  // no direction to speak of
+  if (toward.norm() < 0.05 * h) return false;  // no direction to speak of
   const Vector3d direction = toward.normalized();
   double reach = 0.0;
   for (std::size_t v = 0; v < vertex_weight.size(); ++v)
@@ -404,8 +409,8 @@ bool Reduction::add_tip(int joint, double smallest, const std::vector<double>& v
     for (int i = 1; i <= 4; ++i) inside += skin_.is_inside(from + direction * (l * i / 4.0));
     return inside >= 3 && skin_.is_inside(from + direction * l);
   };
-  while (tip_length >= smallest * h_ && !is_inside(tip_length)) tip_length *= 0.9;
-  if (tip_length < smallest * h_) return false;
+  while (tip_length >= smallest * h && !is_inside(tip_length)) tip_length *= 0.9;
+  if (tip_length < smallest * h) return false;
   const Vector3d tip = from + tip_length * direction;
   if (!conflict(from, tip, node).empty()) return false;
   if (mirror_joint_ != nullptr && is_close_to_image(from, tip)) return false;

@@ -9,6 +9,8 @@
 
 namespace sinew::lattice::detail {
 
+class CellSizes;
+
 /// A bone that shall be soft whatever the geometry says.
 struct SoftBone {
   int frame = -1;      ///< joint.
@@ -20,7 +22,7 @@ struct SoftBone {
 /// Joints with less than this share of the skin's area count as weightless: stray weights of exporters.
 inline constexpr double kWeightless = 1e-6;
 
-/// Thresholds of the reduction; lengths in units of h.
+/// Thresholds of the reduction; lengths in units of h, the target edge of the place.
 struct ReductionOptions {
   double smallest_bone = 0.5;  ///< shorter bones are contracted.
   double cut_distance = 0.25;  ///< a bone farther than this outside the skin may be cut.
@@ -31,6 +33,7 @@ struct ReductionOptions {
   double too_close = 0.15;  ///< bones nearer than this cannot both be edges.
   TipBones tip_bones = TipBones::On;
   std::vector<SoftBone> soft_bones;
+  const CellSizes* sizes = nullptr;  ///< h of every place; null: the same everywhere.
 };
 
 /// A point of the reduced skeleton: several joints may share it after contraction.

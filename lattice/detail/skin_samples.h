@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "lattice/detail/cell_sizes.h"
 #include "lattice/detail/triangle_grid.h"
 #include "lattice/detail/unit_skin.h"
 
@@ -19,8 +20,8 @@ struct SkinSamples {
 /// Whether a lattice has two halves, of which one is built.
 enum class Halves { Both, OneMirrored };
 
-/// Samples for target edge `h` (unit coordinates). With OneMirrored, those with x < 0 are mirrored to the
-/// other side.
-SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves);
+/// Samples for target edge `h` (unit coordinates), denser where `sizes` make it smaller. With OneMirrored,
+/// those with x < 0 are mirrored to the other side.
+SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves, const CellSizes& sizes = {});
 
 }  // namespace sinew::lattice::detail

@@ -67,6 +67,15 @@ TEST_F(SceneFile, ReadsWhichBonesTakePartAndHowLargeCellsAre) {
             "scene.toml:1: bones_include: got a string, expected an array of strings");
 }
 
+TEST_F(SceneFile, SaysWhatIsWrongWithSizes) {
+  EXPECT_EQ(refusal("[[size]]\nbones = [\"a\"]\nfactor = 5"),
+            "scene.toml:3: size 1: factor: got 5, expected 0.25 <= factor <= 4; hint: 0.5");
+  EXPECT_EQ(refusal("[[size]]\nbones = [\"a\"]"),
+            "scene.toml:1: size 1: no factor, expected bones and a factor; hint: bones = [\"belly*\"], "
+            "factor = 0.5");
+  EXPECT_EQ(refusal("[[size]]\nfactr = 0.5"), "scene.toml:2: factr: unknown key; hint: did you mean factor?");
+}
+
 TEST_F(SceneFile, KeepsTheDefaultsOfKeysLeftOut) { EXPECT_EQ(read(""), Scene{}); }
 
 TEST_F(SceneFile, SetsEveryKey) {
@@ -76,10 +85,10 @@ output = "out/hero"
 overwrite = true
 json = true
 clip = "walk"
-lattice = "hero.vtu"
 cells = 500
 tip_bones = "off"
 symmetry = "off"
+coarsen_rigid = "on"
 preview = "off"
 levels = 2
 young = 20000
@@ -104,6 +113,10 @@ output_mesh = "hero.obj"
 bones = ["tail*", "ear_?"]
 young = 5000.0
 
+[[size]]
+bones = ["belly", "hip*"]
+factor = 0.5
+
 [[material]]
 bones = ["belly"]
 poisson = 0.3
@@ -115,9 +128,10 @@ density = 900
   expected.overwrite = true;
   expected.json = true;
   expected.clip = "walk";
-  expected.lattice = "hero.vtu";
   expected.cells = 500;
   expected.tip_bones = expected.symmetry = expected.preview = Switch::Off;
+  expected.coarsen_rigid = Switch::On;
+  expected.sizes = {{{"belly", "hip*"}, 0.5}};
   expected.levels = 2;
   expected.young = 20000.0;
   expected.poisson = 0.49;
@@ -283,6 +297,8 @@ Scene random_scene(std::mt19937_64& rng) {
   if (built && index(2) == 1) scene.bones_exclude = {"toe_?"};
   scene.tip_bones = index(2) == 1 ? Switch::On : Switch::Off;
   scene.symmetry = index(2) == 1 ? Switch::On : Switch::Off;
+  if (built && index(2) == 1) scene.coarsen_rigid = Switch::On;
+  if (built && index(2) == 1) scene.sizes = {{{text(), "a*"}, 0.25 + 3.75 * unit()}, {{"b"}, 1.0}};
   scene.preview = index(2) == 1 ? Switch::On : Switch::Off;
   scene.levels = index(4);
   if (index(2) == 1) scene.young = 1.0 + 1e5 * unit();

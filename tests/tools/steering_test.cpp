@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -45,6 +46,59 @@ TEST_F(Steering, TakesTheEdgeOfTheCellsInsteadOfTheirNumber) {
   EXPECT_NEAR(coarse["lattice"]["edge_length_m"].get<double>(), 0.3, 1e-12);
   EXPECT_NEAR(fine["lattice"]["edge_length_m"].get<double>(), 0.2, 1e-12);
   EXPECT_GT(fine["lattice"]["cells"].get<int>(), coarse["lattice"]["cells"].get<int>());
+}
+
+TEST_F(Steering, SizesCellsBoneByBone) {
+  std::ofstream(out("sized.toml"))
+      << "rig = \"" << SINEW_SOURCE_DIR "/assets/samples/hopper.glb"
+      << "\"\noutput = \"run\"\ncells = 300\n[[size]]\nbones = [\"tail*\"]\nfactor = 0.5\n";
+  const auto lattice_of = [&](const std::string& input, const std::string& name) {
+    const fs::path json = out(name + ".json");
+    const tests::Outcome run = tests::run_line(
+        tests::command_line("lattice " + tests::quoted(input) + " --cells 300 --json --preview off -o " +
+                            tests::quoted(out(name)) + " > " + tests::quoted(json) + " 2>/dev/null"));
+    EXPECT_EQ(run.exit_code, 0) << run.text;
+    return nlohmann::json::parse(tests::read(json));
+  };
+  const auto plain = lattice_of(SINEW_SOURCE_DIR "/assets/samples/hopper.glb", "plain.vtu"),
+             sized = lattice_of(out("sized.toml").string(), "sized.vtu");
+  const auto pieces_of_tail = [](const nlohmann::json& lattice) {
+    std::size_t pieces = 0;
+    for (const auto& bone : lattice["bones"])
+      if (bone["name"].get<std::string>().rfind("tail", 0) == 0 && !bone["soft"].get<bool>())
+        pieces += bone["chain"].size() - 1;
+    return pieces;
+  };
+  EXPECT_GT(pieces_of_tail(sized), pieces_of_tail(plain));
+  EXPECT_TRUE(sized["symmetry"]["mirrored"].get<bool>()) << sized["symmetry"].dump();
+  EXPECT_FALSE(fs::exists(out("run"))) << "the output of a scene is that of a simulation";
+}
+
+TEST_F(Steering, SaysWhyALopsidedLatticeIsNotMirrored) {
+  std::ofstream(out("lopsided.toml")) << "rig = \"" << SINEW_SOURCE_DIR "/assets/samples/hopper.glb"
+                                      << "\"\n[[size]]\nbones = [\"thigh_l\"]\nfactor = 0.5\n";
+  const tests::Outcome run =
+      tests::run(tests::command_line("lattice " + tests::quoted(out("lopsided.toml")) +
+                                     " --cells 300 --preview off -o " + tests::quoted(out("lopsided.vtu"))));
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(run.text,
+              HasSubstr("symmetry: none, as cells are sized by 0.5 at 'thigh_l' and by 1 at its mirror "
+                        "image 'thigh_r'\n"));
+}
+
+TEST_F(Steering, NamesTheBoneThatASizeDoesNotFit) {
+  std::ofstream(out("wrong.toml")) << "rig = \"" << SINEW_SOURCE_DIR "/assets/samples/hopper.glb"
+                                   << "\"\n[[size]]\nbones = [\"tial*\"]\nfactor = 0.5\n";
+  const tests::Outcome run = tests::run(tests::command_line("lattice " + tests::quoted(out("wrong.toml")) +
+                                                            " -o " + tests::quoted(out("wrong.vtu"))));
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.text, "sinew: size 1: no bone is named 'tial*'; hint: did you mean tail*?\n");
+  EXPECT_FALSE(fs::exists(out("wrong.vtu")));
+  const std::string scene = tests::quoted(out("wrong.toml"));
+  EXPECT_THAT(tests::run(tests::command_line("lattice " + scene + " --lattice l.vtu -o " +
+                                             tests::quoted(out("wrong.vtu"))))
+                  .text,
+              HasSubstr("[[size]]: expected none as the lattice is read from l.vtu"));
 }
 
 TEST_F(Steering, NamesTheNearestBoneWhereAPatternFitsNone) {
