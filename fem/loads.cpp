@@ -88,11 +88,15 @@ LoadForces::LoadForces(const Body& body, const Loads& loads) {
         fixed_.row(it.col()) += it.value() * loads.points[static_cast<std::size_t>(k)].force.transpose();
     }
   }
-  Eigen::Vector3d density = Eigen::Vector3d::Zero();
+  Eigen::Vector3d density = Eigen::Vector3d::Zero(), acceleration = Eigen::Vector3d::Zero();
   for (const BodyLoad& load : loads.bodies) {
     require_finite(load.density, "body load");
+    require_finite(load.acceleration, "body load");
     density += load.density;
+    acceleration += load.acceleration;
   }
+  for (int a = 0; a < mesh.num_vertices(); ++a)
+    fixed_.row(a) += body.vertex_mass[static_cast<std::size_t>(a)] * acceleration.transpose();
   for (std::size_t c = 0; c < mesh.cells.size() && !loads.bodies.empty(); ++c) {
     const std::array<double, 8> weights =
         gauss_weights(lattice::hex_corners(mesh.points, mesh.cells[c]), body.fill[c]);

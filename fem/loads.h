@@ -13,9 +13,10 @@ struct PointLoad {
   Eigen::Vector3d force{0, 0, 0};  ///< [N], of fixed direction.
 };
 
-/// A force per volume of flesh at rest.
+/// A force on all of the flesh, of fixed direction.
 struct BodyLoad {
-  Eigen::Vector3d density{0, 0, 0};  ///< [N/m^3], of fixed direction.
+  Eigen::Vector3d density{0, 0, 0};       ///< per volume of flesh at rest [N/m^3].
+  Eigen::Vector3d acceleration{0, 0, 0};  ///< per mass [m/s^2].
 };
 
 /// Faces of the leaf mesh's boundary whose corners all rest within a box (its bounds included). A flat face

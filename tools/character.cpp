@@ -14,6 +14,7 @@
 #include "fem/default_material.h"
 #include "tools/failure.h"
 #include "tools/plain_character.h"
+#include "tools/plain_loads.h"
 
 namespace sinew::tools {
 namespace {
@@ -166,7 +167,21 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
   report_lattice(scene, c.lattice, talk);
 }
 
-void load_plain(const Scene& scene, Character& c) {
+/// What a model or a scene cannot do with what drives the flesh.
+void warn_of_drive(const Scene& scene, const Talk& talk) {
+  const PlainScene& plain = *scene.plain;
+  const bool is_skin = !fem::find_model(scene.model)->dynamic;
+  if (is_skin && (plain.is_loaded() || plain.velocity))
+    talk("warning: model '" + scene.model + "' has no dynamics: loads and velocity do nothing");
+  if (!plain.is_held() && scene.settle > 0.0) talk("nothing holds the flesh: it starts without settling");
+  const bool turns = plain.velocity && !plain.velocity->spin.isZero(0.0);
+  if (!plain.is_held() && turns && (scene.model == "blended" || scene.model == "blended-stiffness"))
+    talk("warning: model '" + scene.model +
+         "' is linear in the bones' frames and nothing turns with this flesh; hint: --model corotational");
+}
+
+void load_plain(const Scene& scene, const Talk& talk, Character& c) {
+  warn_of_drive(scene, talk);
   const Phase phase(c.times, "lattice");
   PlainCharacter plain = make_plain_character(scene);
   c.rig = std::move(plain.rig);
@@ -182,7 +197,7 @@ void load_plain(const Scene& scene, Character& c) {
 Character make_character(const Scene& scene, const Talk& talk) {
   Character c;
   if (scene.plain) {
-    load_plain(scene, c);
+    load_plain(scene, talk, c);
   } else {
     load_rig(scene, talk, c);
   }
@@ -219,6 +234,11 @@ fem::SimulationOptions simulation_options(const Scene& scene) {
   options.solver.basis = fem::Basis::Nodal;
   options.gravity = scene.gravity;
   options.settle_limit = scene.settle;
+  if (scene.plain) {
+    options.loads = loads_of(*scene.plain);
+    // Flesh that nothing holds would fall for as long as it may settle.
+    if (!scene.plain->is_held()) options.settle_limit = 0.0;
+  }
   return options;
 }
 

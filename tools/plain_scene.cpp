@@ -21,7 +21,9 @@ constexpr double kMaxBlocks = 1e6;      // as many as `cells` allows
 constexpr double kMaxCoordinate = 1e6;  // [m]
 constexpr double kMinSize = 1e-9;       // [m]
 constexpr double kMaxTime = 1e6;        // [s]
-constexpr double kMaxTurn = 3.6e6;      // [degrees]: ten thousand turns
+constexpr double kMaxTurn = 3.6e6;      // [degrees], [degrees/s]: ten thousand turns
+constexpr double kMaxLoad = 1e12;       // [N], [Pa], [N/m^3], [m/s^2]: the stiffest flesh has 1e12 Pa
+constexpr double kMaxSpeed = 1e4;       // [m/s]
 constexpr std::array<const char*, 3> kTypeNames{"tetrahedra", "wedges", "hexahedra"};  // in the enum's order
 
 std::string text_of(const Eigen::Vector3d& v) { return fmt::format("[{}, {}, {}]", v[0], v[1], v[2]); }
@@ -74,6 +76,60 @@ void require_bone(const std::string& name, const std::vector<std::string>& known
                   guess.empty() ? "" : fmt::format("; hint: did you mean {}?", guess)));
 }
 
+void require_vector(const Eigen::Vector3d& value, double largest, const std::string& where,
+                    const std::string& unit) {
+  require(value.allFinite() && value.cwiseAbs().maxCoeff() <= largest, where, text_of(value),
+          fmt::format("three numbers within {:g} {}", largest, unit));
+}
+
+void validate_loads(const PlainScene& plain) {
+  const Eigen::Array3d slack = 1e-9 * plain.box.size.array();
+  const Eigen::Array3d lowest = plain.box.corner.array() - slack,
+                       highest = (plain.box.corner + plain.box.size).array() + slack;
+  for (std::size_t i = 0; i < plain.point_loads.size(); ++i) {
+    const PlainPointLoad& load = plain.point_loads[i];
+    const std::string where = fmt::format("point_load {}", i + 1);
+    require((load.at.array() >= lowest).all() && (load.at.array() <= highest).all(), where + ": at",
+            text_of(load.at), "a point of the box");
+    require_vector(load.force, kMaxLoad, where + ": force", "N");
+  }
+  for (std::size_t i = 0; i < plain.body_loads.size(); ++i) {
+    const std::string where = fmt::format("body_load {}", i + 1);
+    require_vector(plain.body_loads[i].density, kMaxLoad, where + ": density", "N/m^3");
+    require_vector(plain.body_loads[i].acceleration, kMaxLoad, where + ": acceleration", "m/s^2");
+  }
+  for (std::size_t i = 0; i < plain.face_loads.size(); ++i) {
+    const PlainFaceLoad& load = plain.face_loads[i];
+    const std::string where = fmt::format("face_load {}", i + 1);
+    require(std::abs(load.pressure) <= kMaxLoad, where + ": pressure", fmt::format("{}", load.pressure),
+            fmt::format("a number within {:g} Pa", kMaxLoad));
+    require_vector(load.traction, kMaxLoad, where + ": traction", "Pa");
+  }
+  if (!plain.velocity) return;
+  require_vector(plain.velocity->linear, kMaxSpeed, "velocity: linear", "m/s");
+  require_vector(plain.velocity->spin, kMaxTurn, "velocity: spin", "degrees/s");
+  if (plain.velocity->about) require_point(*plain.velocity->about, "velocity: about");
+}
+
+std::string print_loads(const PlainScene& plain) {
+  std::string text;
+  for (const PlainPointLoad& load : plain.point_loads)
+    text += fmt::format("\n[[point_load]]\nat = {}\nforce = {}\n", text_of(load.at), text_of(load.force));
+  for (const PlainBodyLoad& load : plain.body_loads) {
+    text += fmt::format("\n[[body_load]]\ndensity = {}\nacceleration = {}\n", text_of(load.density),
+                        text_of(load.acceleration));
+  }
+  for (const PlainFaceLoad& load : plain.face_loads) {
+    text += fmt::format("\n[[face_load]]\nface = \"{}\"\npressure = {}\ntraction = {}\n",
+                        face_name(load.face), load.pressure, text_of(load.traction));
+  }
+  if (!plain.velocity) return text;
+  text += fmt::format("\n[velocity]\nlinear = {}\nspin = {}\n", text_of(plain.velocity->linear),
+                      text_of(plain.velocity->spin));
+  if (plain.velocity->about) text += fmt::format("about = {}\n", text_of(*plain.velocity->about));
+  return text;
+}
+
 std::string print_bone(const PlainBone& bone) {
   std::string text = "\n[[bone]]\nname = " + toml_quoted(bone.name, "bone") + "\n";
   if (!bone.parent.empty()) text += "parent = " + toml_quoted(bone.parent, "parent") + "\n";
@@ -109,6 +165,7 @@ void PlainScene::validate() const {
   for (std::size_t i = 0; i < fixed.size(); ++i) {
     if (!fixed[i].bone.empty()) require_bone(fixed[i].bone, names, fmt::format("fixed {}: bone", i + 1));
   }
+  validate_loads(*this);
 }
 
 std::string face_name(const BoxFace& face) {
@@ -142,7 +199,7 @@ std::string print_plain_scene(const PlainScene& plain) {
     text += fmt::format("\n[[fixed]]\nface = \"{}\"\n", face_name(f.face));
     if (!f.bone.empty()) text += "bone = " + toml_quoted(f.bone, "fixed") + "\n";
   }
-  return text;
+  return text + print_loads(plain);
 }
 
 }  // namespace sinew::tools

@@ -65,14 +65,55 @@ struct FixedFace {
   friend bool operator==(const FixedFace&, const FixedFace&) = default;
 };
 
+/// `[[point_load]]`: a force on one point of the flesh.
+struct PlainPointLoad {
+  Eigen::Vector3d at{0, 0, 0};     ///< rest [m]; in the box.
+  Eigen::Vector3d force{0, 0, 0};  ///< [N], of fixed direction.
+
+  friend bool operator==(const PlainPointLoad&, const PlainPointLoad&) = default;
+};
+
+/// `[[body_load]]`: a force on all of the flesh, of fixed direction.
+struct PlainBodyLoad {
+  Eigen::Vector3d density{0, 0, 0};       ///< per volume at rest [N/m^3].
+  Eigen::Vector3d acceleration{0, 0, 0};  ///< per mass [m/s^2].
+
+  friend bool operator==(const PlainBodyLoad&, const PlainBodyLoad&) = default;
+};
+
+/// `[[face_load]]`: a force on a side of the box.
+struct PlainFaceLoad {
+  BoxFace face;
+  /// Against the posed surface, turning with it [Pa]; positive pushes inwards.
+  double pressure = 0.0;
+  /// Per area at rest, of fixed direction [Pa].
+  Eigen::Vector3d traction{0, 0, 0};
+
+  friend bool operator==(const PlainFaceLoad&, const PlainFaceLoad&) = default;
+};
+
+/// `[velocity]`: what flesh that no bone holds starts with, linear + spin x (position - about).
+struct PlainVelocity {
+  Eigen::Vector3d linear{0, 0, 0};       ///< [m/s].
+  Eigen::Vector3d spin{0, 0, 0};         ///< about its direction by the right hand [degrees/s].
+  std::optional<Eigen::Vector3d> about;  ///< [m]; unset: the box's centre.
+
+  friend bool operator==(const PlainVelocity&, const PlainVelocity&) = default;
+};
+
 /// Everything of a scene that a rig would say otherwise.
 struct PlainScene {
   PlainBox box;
   std::vector<PlainBone> bones;
   std::vector<FixedFace> fixed;
+  std::vector<PlainPointLoad> point_loads;
+  std::vector<PlainBodyLoad> body_loads;
+  std::vector<PlainFaceLoad> face_loads;
+  std::optional<PlainVelocity> velocity;
 
   /// True where anything holds the flesh against falling.
   bool is_held() const { return !bones.empty() || !fixed.empty(); }
+  bool is_loaded() const { return !point_loads.empty() || !body_loads.empty() || !face_loads.empty(); }
 
   /// Throws assets::ConfigError naming the thing, its value and the range.
   void validate() const;

@@ -21,6 +21,7 @@
 #include "tools/command.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
+#include "tools/plain_loads.h"
 #include "tools/scene_fields.h"
 #include "tools/simulate_options.h"
 
@@ -184,6 +185,7 @@ void find_pose(const PoseRequest& request) {
   options.gravity = scene.gravity;
   options.steps = request.load_steps;
   options.solver = simulation_options(scene).solver;
+  if (scene.plain) options.loads = loads_of(*scene.plain);
   const skeleton::Skeleton& skeleton = character.rig.skeleton;
   const skeleton::Pose wanted = skeleton::sample(skeleton, character.the_clip(), time);
   const fem::Equilibrium found = fem::find_equilibrium(body, path_to(skeleton, wanted), options);

@@ -98,8 +98,8 @@ class SceneReader : public detail::TomlReader {
     }
     throw ConfigError(
         file_ +
-        ": [lattice]: missing, expected a box; hint: bones and fixed faces belong to scenes without "
-        "a rig, whose flesh is a box");
+        ": [lattice]: missing, expected a box; hint: bones, fixed faces, loads and velocities belong to "
+        "scenes without a rig, whose flesh is a box");
   }
 
   int integer_in(const SceneField& field, const toml::node& node, const std::string& where) const {

@@ -25,6 +25,7 @@
 #include "tools/command.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
+#include "tools/plain_loads.h"
 #include "tools/progress.h"
 #include "tools/run_report.h"
 #include "tools/simulate_options.h"
@@ -280,6 +281,8 @@ void simulate(const Scene& scene, const Talk& talk) {
   const fem::SimulationReport settled = simulation.settle();
   lap("factor and settle");
   if (settled.status != fem::SimulationStatus::Ok) fail(character, settled, "settling");
+  if (scene.plain && scene.plain->velocity)
+    simulation.set_velocity(starting_velocity(*scene.plain, simulation.state().x));
   report.settle_steps = settled.steps;
   report.settle_speed = settled.speed;
   talk(

@@ -221,7 +221,8 @@ TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
 
 TEST_F(SceneFile, ListsTheKnownKeysWhereNoneIsNear) {
   const std::string message = refusal("temperature = 3");
-  EXPECT_EQ(message.rfind("scene.toml:1: temperature: unknown key; hint: known are bone, bones_exclude,", 0),
+  EXPECT_EQ(message.rfind(
+                "scene.toml:1: temperature: unknown key; hint: known are body_load, bone, bones_exclude,", 0),
             0u)
       << message;
 }

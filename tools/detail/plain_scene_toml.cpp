@@ -133,9 +133,84 @@ FixedFace read_fixed(const TomlReader& reader, const toml::table& table, const s
   return fixed;
 }
 
+/// Reads a key and notes that it was there.
+Entry required_vector(const TomlReader& reader, const char* key, Eigen::Vector3d& value, bool& has) {
+  return {key, [&](const toml::node& node, const std::string& where) {
+            value = reader.vector(node, where);
+            has = true;
+          }};
+}
+
+[[noreturn]] void refuse_missing(const TomlReader& reader, const toml::table& table, const std::string& where,
+                                 const std::string& what) {
+  throw ConfigError(fmt::format("{}: {}: {}", reader.place(table), where, what));
+}
+
+PlainPointLoad read_point_load(const TomlReader& reader, const toml::table& table, const std::string& where) {
+  PlainPointLoad load;
+  bool has_at = false, has_force = false;
+  reader.read_table(table, where,
+                    {required_vector(reader, "at", load.at, has_at),
+                     required_vector(reader, "force", load.force, has_force)});
+  if (!has_at) refuse_missing(reader, table, where, "at: missing, expected three coordinates in metres");
+  if (!has_force) refuse_missing(reader, table, where, "force: missing, expected three numbers in newtons");
+  return load;
+}
+
+PlainBodyLoad read_body_load(const TomlReader& reader, const toml::table& table, const std::string& where) {
+  PlainBodyLoad load;
+  bool has_density = false, has_acceleration = false;
+  reader.read_table(table, where,
+                    {required_vector(reader, "density", load.density, has_density),
+                     required_vector(reader, "acceleration", load.acceleration, has_acceleration)});
+  if (!has_density && !has_acceleration)
+    refuse_missing(reader, table, where,
+                   "no load, expected density (N/m^3) or acceleration (m/s^2); hint: density = [0, -100, 0]");
+  return load;
+}
+
+PlainFaceLoad read_face_load(const TomlReader& reader, const toml::table& table, const std::string& where) {
+  PlainFaceLoad load;
+  std::optional<BoxFace> face;
+  bool has_pressure = false, has_traction = false;
+  reader.read_table(table, where,
+                    {face_entry(reader, face),
+                     {"pressure",
+                      [&](const toml::node& node, const std::string& at) {
+                        load.pressure = reader.number(node, at);
+                        has_pressure = true;
+                      }},
+                     required_vector(reader, "traction", load.traction, has_traction)});
+  if (!face)
+    refuse_missing(reader, table, where, "face: missing, expected a side of the box; hint: face = \"x-max\"");
+  if (!has_pressure && !has_traction)
+    refuse_missing(reader, table, where,
+                   "no load, expected pressure (turns with the surface) or traction (keeps its direction) in "
+                   "pascal; hint: pressure = 100");
+  load.face = *face;
+  return load;
+}
+
+PlainVelocity read_velocity(const TomlReader& reader, const toml::table& table) {
+  PlainVelocity velocity;
+  bool has_linear = false, has_spin = false;
+  reader.read_table(table, "velocity",
+                    {required_vector(reader, "linear", velocity.linear, has_linear),
+                     required_vector(reader, "spin", velocity.spin, has_spin),
+                     {"about", [&](const toml::node& node, const std::string& at) {
+                        velocity.about = reader.vector(node, at);
+                      }}});
+  if (!has_linear && !has_spin)
+    refuse_missing(reader, table, "velocity",
+                   "no velocity, expected linear (m/s) or spin (degrees/s); hint: linear = [0, 1, 0]");
+  return velocity;
+}
+
 }  // namespace
 
-std::vector<std::string> plain_scene_keys() { return {"bone", "fixed", "lattice"}; }
+std::vector<std::string> plain_scene_keys() {
+  return {"body_load", "bone", "face_load", "fixed", "lattice", "point_load", "velocity"};
+}
 
 void read_plain_scene(const TomlReader& reader, const std::string& key, const toml::node& node,
                       PlainScene& plain) {
@@ -153,6 +228,20 @@ void read_plain_scene(const TomlReader& reader, const std::string& key, const to
     tables([&](const auto& table, const auto& where) {
       plain.fixed.push_back(read_fixed(reader, table, where));
     });
+  } else if (key == "point_load") {
+    tables([&](const auto& table, const auto& where) {
+      plain.point_loads.push_back(read_point_load(reader, table, where));
+    });
+  } else if (key == "body_load") {
+    tables([&](const auto& table, const auto& where) {
+      plain.body_loads.push_back(read_body_load(reader, table, where));
+    });
+  } else if (key == "face_load") {
+    tables([&](const auto& table, const auto& where) {
+      plain.face_loads.push_back(read_face_load(reader, table, where));
+    });
+  } else if (key == "velocity") {
+    plain.velocity = read_velocity(reader, reader.table(node, reader.place(node) + ": velocity"));
   }
 }
 
