@@ -1,19 +1,95 @@
 #include "fem/models/blended.h"
 
 #include <cmath>
-#include <numbers>
+#include <deque>
 #include <stdexcept>
 #include <vector>
 
+#include <Eigen/QR>
 #include <fmt/format.h>
 
 #include "fem/blended_solver.h"
 #include "fem/models/balance.h"
+#include "fem/models/free_system.h"
+#include "fem/models/repeated_factor.h"
 #include "fem/models/rotated_stiffness.h"
 #include "fem/placement.h"
 
 namespace sinew::fem {
 namespace {
+
+/// K + P of the whole flesh in a pose and the matrix A of a backward Euler step with it.
+struct RestSystem {
+  FreeVertices free;
+  BlockSystem rest, step;
+  RepeatedFactor factor;
+  Factor::Report factor_report;
+  double h;
+
+  RestSystem(const Body& body, const PosedFrames& pose, double step_length)
+      : free(free_vertices(body)), rest(body, free), step(body, free), h(step_length) {
+    const RotatedStiffness cells(body);
+    const std::vector<Eigen::Matrix3d> rotations = frame_rotations(body, pose);
+    std::vector<CellStiffness> matrices;
+    for (std::size_t c = 0; c < rotations.size(); ++c)
+      matrices.push_back(cells.rotated(static_cast<int>(c), rotations[c]));
+    rest.assemble(0.0, 1.0, matrices);
+    const SystemFactors of =
+        system_factors(stage_of(Integrator::BackwardEuler), h, body.damping.alpha(), body.damping.beta());
+    for (CellStiffness& matrix : matrices) matrix *= of.stiffness;
+    step.assemble(of.mass, of.tie, matrices);
+    factor_report = factor.factorise(rest.lower());
+  }
+
+  /// K^-1 A v / h at the unknowns.
+  lattice::Points correction(const lattice::Points& v) const {
+    lattice::Points at_unknowns(free.num_unknowns(), 3), image;
+    for (int i = 0; i < free.num_unknowns(); ++i)
+      at_unknowns.row(i) = v.row(free.vertex[static_cast<std::size_t>(i)]);
+    step.apply(at_unknowns, image);
+    image /= h;
+    factor.solve(Eigen::Map<Eigen::VectorXd>(image.data(), image.size()));
+    return image;
+  }
+};
+
+/// Anderson's mixing for a zero of g: the combination of the last steps whose g is least, and from there a
+/// whole step of that g.
+class AndersonMixing {
+ public:
+  explicit AndersonMixing(std::size_t depth) : depth_(depth) {}
+
+  /// What to add to the present point, where g is `g`.
+  lattice::Points step(const lattice::Points& g) {
+    if (!last_g_.size()) return remember(g, g);
+    changes_.push_back({last_step_, g - last_g_});
+    if (changes_.size() > depth_) changes_.pop_front();
+    Eigen::MatrixXd of_g(g.size(), static_cast<Eigen::Index>(changes_.size()));
+    for (std::size_t k = 0; k < changes_.size(); ++k)
+      of_g.col(static_cast<Eigen::Index>(k)) =
+          Eigen::Map<const Eigen::VectorXd>(changes_[k].g.data(), g.size());
+    const Eigen::VectorXd share =
+        of_g.colPivHouseholderQr().solve(Eigen::Map<const Eigen::VectorXd>(g.data(), g.size()));
+    lattice::Points move = g;
+    for (std::size_t k = 0; k < changes_.size(); ++k)
+      move -= share[static_cast<Eigen::Index>(k)] * (changes_[k].x + changes_[k].g);
+    return remember(g, move);
+  }
+
+ private:
+  struct Change {
+    lattice::Points x, g;
+  };
+  lattice::Points remember(const lattice::Points& g, const lattice::Points& move) {
+    last_g_ = g;
+    last_step_ = move;
+    return move;
+  }
+
+  std::size_t depth_;
+  std::deque<Change> changes_;
+  lattice::Points last_g_, last_step_;
+};
 
 class Blended final : public Model {
  public:
@@ -48,6 +124,7 @@ class Blended final : public Model {
 
  private:
   const lattice::Points& acceleration(const lattice::Points& force);
+  lattice::Points first_velocity(const PoseProblem& problem, double h, const lattice::Points& x);
 
   const Body& body_;
   BlendedSolver solver_;
@@ -83,47 +160,68 @@ const lattice::Points& Blended::acceleration(const lattice::Points& force) {
   return acceleration_;
 }
 
-/// The blend of the regions' answers is no one system's solution: it is found by letting the flesh come to
-/// rest, with the drag and the default step of a run, as the pose held there depends slightly on the step.
-SolveReport Blended::equilibrate(const PoseProblem& problem, lattice::Points& x) {
-  constexpr double kStep = 1.0 / 120.0, kLongest = 20.0, kRest = 1e-9;  // s, s, shares of the size per second
-  SolveReport report = prepare(kStep, Integrator::BackwardEuler);
-  if (!report.ok()) return report;
+/// One backward Euler step of `h` from flesh at x without velocity, in a pose that stands still.
+lattice::Points Blended::first_velocity(const PoseProblem& problem, double h, const lattice::Points& x) {
   PosedFrames earlier = *problem.pose, now = *problem.pose, later = *problem.pose;
-  earlier.time = -kStep;
+  earlier.time = -h;
   now.time = 0.0;
-  later.time = kStep;
+  later.time = h;
   State state;
   state.x = x;
-  place_bones(body_, now, state.x);
-  fill_inactive_leaves(body_, state.x);
   state.v = lattice::Points::Zero(x.rows(), 3);
-  const double keep = 1.0 / (1.0 + 4.0 * std::numbers::pi * body_.damping.frequency * kStep);
-  for (; report.iterations * kStep < kLongest; ++report.iterations) {
-    StageProblem stage;
-    stage.state = &state;
-    stage.x_h = &state.x;
-    stage.v_h = &state.v;
-    stage.poses = {&earlier, &now, &later};
-    stage.h = kStep;
-    stage.integrator = Integrator::BackwardEuler;
-    stage.gravity = problem.gravity;
-    stage.force = problem.force;
-    lattice::Points v;
-    report.status = solve_stage(stage, v).status;
-    state.x += kStep * v;
-    state.v = keep * v;
-    place_bones(body_, now, state.x);
-    report.residual = v.rowwise().norm().maxCoeff() / body_.size;
-    if (!std::isfinite(report.residual)) break;
-    if (report.residual > kRest) continue;
-    x = state.x;
+  StageProblem stage;
+  stage.state = &state;
+  stage.x_h = &state.x;
+  stage.v_h = &state.v;
+  stage.poses = {&earlier, &now, &later};
+  stage.h = h;
+  stage.integrator = Integrator::BackwardEuler;
+  stage.gravity = problem.gravity;
+  stage.force = problem.force;
+  lattice::Points v;
+  // Direct solves with factors that are there.
+  if (const SolveReport report = solve_stage(stage, v); !report.ok()) throw std::logic_error(report.message);
+  return v;
+}
+
+/// The blend of the regions' answers is no one system's solution: flesh is at rest where a step of a run, of
+/// the default length as the held pose depends slightly on it, leaves it without velocity. That velocity v is
+/// an affine function of x. With A the matrix of the step and K that of the whole flesh, every cell turned
+/// with its frames, the correction K^-1 A v / h is exact for one region; for several, Anderson's mixing
+/// ([Anderson65]) of such corrections finds the zero.
+SolveReport Blended::equilibrate(const PoseProblem& problem, lattice::Points& x) {
+  constexpr double kStep = 1.0 / 120.0;  // s
+  constexpr double kRest = 1e-10;        // share of the size
+  constexpr int kMostIterations = 300;
+  SolveReport report = prepare(kStep, Integrator::BackwardEuler);
+  if (!report.ok()) return report;
+  const RestSystem system(body_, *problem.pose, kStep);
+  if (!system.factor_report.ok) {
+    report.status = SolveStatus::NotPositiveDefinite;
+    report.message = "blended: the flesh can move without being held: " + system.factor_report.message;
     return report;
   }
+  lattice::Points place = x;
+  place_bones(body_, *problem.pose, place);
+  fill_inactive_leaves(body_, place);
+  AndersonMixing mixing(10);
+  lattice::Points v;
+  for (; report.iterations < kMostIterations; ++report.iterations) {
+    v = first_velocity(problem, kStep, place);
+    const lattice::Points correction = system.correction(v);
+    report.residual = correction.rowwise().norm().maxCoeff() / body_.size;
+    if (!std::isfinite(report.residual)) break;
+    if (report.residual <= kRest) {
+      x = place;
+      return report;
+    }
+    place += system.free.spread(mixing.step(correction));
+  }
   report.status = SolveStatus::NoConvergence;
-  report.message = fmt::format("blended: not at rest after {} steps, moves by {:.2g} of its size per second",
-                               report.iterations, report.residual);
-  name_worst_cell(body_, state.x, state.v, report);
+  report.message =
+      fmt::format("blended: not at rest after {} iterations, the next would move it by {:.2g} of its size",
+                  report.iterations, report.residual);
+  name_worst_cell(body_, place, v, report);
   return report;
 }
 
