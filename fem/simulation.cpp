@@ -131,7 +131,7 @@ SimulationReport Simulation::settle() {
     later.time = now_.time + h;
     SolveReport solve = model_->prepare(h, options_.integrator);
     if (solve.ok())
-      solve = model_->solve_stage(stage(state_.x, state_.v, {&earlier, &now_, &later}, h, false), v);
+      solve = model_->solve_stage(stage(state_.x, state_.v, {&earlier, &now_, &later}, h, start_, false), v);
     if (solve.status == SolveStatus::NoConvergence && halvings < kMostHalvings) {
       ++halvings;
       good_steps = 0;
@@ -203,8 +203,9 @@ int Simulation::halvings_for(double begin, double h) const {
   return halvings;
 }
 
+/// `time`: when forces are asked for.
 StageProblem Simulation::stage(const Points& x_h, const Points& v_h, const StagePoses& poses, double h,
-                               bool use_past) {
+                               double time, bool use_past) {
   StageProblem problem;
   problem.state = &state_;
   problem.x_h = &x_h;
@@ -213,10 +214,12 @@ StageProblem Simulation::stage(const Points& x_h, const Points& v_h, const Stage
   problem.h = h;
   problem.integrator = options_.integrator;
   problem.gravity = options_.gravity;
-  if (!options_.loads.empty()) {
-    force_ = loads_.at(state_.x);
-    problem.force = &force_;
+  if (!options_.loads.empty()) force_ = loads_.at(state_.x);
+  if (options_.force) {
+    const Points further = options_.force(time);
+    force_ = options_.loads.empty() ? further : Points(force_ + further);
   }
+  if (!options_.loads.empty() || options_.force) problem.force = &force_;
   problem.use_past = use_past;
   return problem;
 }
@@ -226,7 +229,7 @@ SolveReport Simulation::stage_without_history(double span, double h, const Posed
   const PosedFrames middle = pose_at(state_.time + scheme.eta * h);
   Points v;
   const SolveReport solve = model_->solve_stage(
-      stage(state_.x, state_.v, {has_before_ ? &past_ : nullptr, &now_, &middle}, h, false), v);
+      stage(state_.x, state_.v, {has_before_ ? &past_ : nullptr, &now_, &middle}, h, middle.time, false), v);
   if (!solve.ok()) return solve;
   after.x = state_.x + span * v;
   after.v = state_.v + (v - state_.v) * (span / (scheme.theta * h));
@@ -238,7 +241,8 @@ SolveReport Simulation::stage_with_history(double h, const PosedFrames& next, St
   const Stage scheme = stage_of(options_.integrator);
   const Points x_h = state_.x + scheme.look_back * (state_.x - state_.x_past);
   const Points v_h = state_.v + scheme.look_back * (state_.v - state_.v_past);
-  const SolveReport solve = model_->solve_stage(stage(x_h, v_h, {&past_, &now_, &next}, h, true), after.v);
+  const SolveReport solve =
+      model_->solve_stage(stage(x_h, v_h, {&past_, &now_, &next}, h, next.time, true), after.v);
   if (!solve.ok()) return solve;
   after.x = x_h + scheme.eta * h * after.v;
   place_bones(body_, next, after.x);
@@ -289,7 +293,7 @@ SimulationReport Simulation::step_once(double h) {
     }
     case Integrator::BackwardEuler: {
       const StagePoses poses{has_before_ ? &past_ : nullptr, &now_, &next};
-      solve = model_->solve_stage(stage(state_.x, state_.v, poses, h, false), after.v);
+      solve = model_->solve_stage(stage(state_.x, state_.v, poses, h, end, false), after.v);
       if (!solve.ok()) break;
       after.x = state_.x + h * after.v;
       place_bones(body_, next, after.x);

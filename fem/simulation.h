@@ -28,6 +28,8 @@ struct SimulationOptions {
   std::string model{kDefaultModel};
   SolverOptions solver;
   Loads loads;  ///< from the start on; pressures follow the surface as it stands at the begin of every step.
+  /// Further forces on the leaf vertices at a time, num_vertices x 3 [N]; empty: none.
+  std::function<lattice::Points(double time)> force;
 
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;
@@ -85,7 +87,7 @@ class Simulation {
   SolveReport stage_with_history(double h, const PosedFrames& next, State& after);
   void accept(State after, PosedFrames next);
   StageProblem stage(const lattice::Points& x_h, const lattice::Points& v_h, const StagePoses& poses,
-                     double h, bool use_past);
+                     double h, double time, bool use_past);
   SimulationReport failed(const SolveReport& solve) const;
   bool check(SimulationReport& report) const;
 
@@ -96,7 +98,7 @@ class Simulation {
   const ModelInfo* info_;
   std::unique_ptr<Model> model_;
   LoadForces loads_;
-  lattice::Points force_;  ///< of the loads, in the stage under way.
+  lattice::Points force_;  ///< of loads and options_.force, in the stage under way.
   double start_ = 0.0;
   State state_, before_;     ///< now and one step earlier, for sampling.
   PosedFrames now_, past_;   ///< their poses.
