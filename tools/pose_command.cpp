@@ -215,7 +215,8 @@ void add_pose_command(CLI::App& app, CommandContext& context) {
       ->add_option("--time", request->time, "time of the pose in the clip; left out: that of the first frame")
       ->type_name("s");
   command
-      ->add_option("--load-steps", request->load_steps, "steps in which pose and gravity grow; 1 ... 10000")
+      ->add_option("--load-steps", request->load_steps,
+                   "steps in which pose, gravity and loads grow; 1 ... 10000")
       ->capture_default_str();
   command->footer(
       "Writes pose.vtu (the lattice's cells at rest, with displacement, Green strain, Cauchy and von Mises "

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <regex>
 #include <sstream>
 
 #include <gtest/gtest.h>
@@ -32,8 +33,8 @@ class ReferenceScenes : public tests::Simulate {
   std::vector<Eigen::Vector3f> path_of(const std::string& scene, const Eigen::RowVector3f& rest,
                                        const std::string& flags = {}) const {
     const std::string file = std::string(SINEW_SOURCE_DIR) + "/tests/scenes/" + scene + ".toml";
-    const tests::Outcome run = tests::run(tests::command_line("simulate " + tests::quoted(file) + " -o " +
-                                                              tests::quoted(out(scene)) + " " + flags));
+    const tests::Outcome run = tests::run(tests::command_line(
+        "simulate " + tests::quoted(file) + " -o " + tests::quoted(out(scene)) + " --preview off " + flags));
     EXPECT_EQ(run.exit_code, 0) << run.text;
     std::vector<Eigen::Vector3f> path;
     if (run.exit_code != 0) return path;
@@ -71,6 +72,24 @@ TEST_F(ReferenceScenes, TheReleasedBarFollowsTheModalSolutionWithinOnePerCentOfI
   EXPECT_LT(transient_error(path_of("bar_release_damped", tip), 100.0, 2), 1.0);
 }
 
+// A free block that turns once a second. Backward Euler at 1/60 s loses a third of the spin in a second, as
+// tan D+ = sin D / (2 - cos D) says of the angle D of a step; BDF2 turns 1.5 % too little
+// (0.097 rad).
+TEST_F(ReferenceScenes, AFreeBlockLosesItsSpinByBackwardEulerAndKeepsItByBdf2) {
+  const Eigen::RowVector3f end(0.2F, 0.0F, 0.0F);
+  const double step = 2.0 * M_PI / 60.0;
+  double turned = std::atan(step), sum = turned;
+  for (int n = 1; n < 60; ++n) sum += turned = std::atan(std::sin(turned) / (2.0 - std::cos(turned)));
+  const auto angle_left = [&](const std::string& integrator, double expected) {
+    const Eigen::Vector3f u = path_of("spin", end, "--overwrite --integrator " + integrator).at(60);
+    const double angle = std::atan2(static_cast<double>(u.y()), 0.2 + static_cast<double>(u.x()));
+    return std::remainder(angle - expected, 2.0 * M_PI);
+  };
+  EXPECT_NEAR(turned / step, 0.66, 0.005);
+  EXPECT_NEAR(angle_left("backward-euler", sum), 0.0, 2e-3 * sum);
+  EXPECT_NEAR(angle_left("bdf2", 2.0 * M_PI), 0.0, 0.11);
+}
+
 /// Displacement of the lattice vertex that rests at `rest`, from a pose.
 class ReferencePoses : public tests::Simulate {
  protected:
@@ -98,19 +117,31 @@ class ReferencePoses : public tests::Simulate {
 };
 
 // Converged answers of other codes: (-0.06964, -0.34565) for StVK and (-0.0665, -0.3463) for neo-Hookean,
-// each known to 0.0006 m. 20 x 4 x 4 active cells are within 1.5 % of the length of the way.
+// each known to 0.0006 m. 30 x 6 x 6 active cells are within 1 % of the way.
 TEST_F(ReferencePoses, TheBarSagsAsOtherCodesSay) {
   const Eigen::Vector3d stvk = tip("bar_sag_finite", "--model stvk");
-  EXPECT_LT((stvk - Eigen::Vector3d(-0.06964, 0.0, -0.34565)).norm(), 0.015 * 0.3526) << stvk.transpose();
+  EXPECT_LT((stvk - Eigen::Vector3d(-0.06964, 0.0, -0.34565)).norm(), 0.01 * 0.3526) << stvk.transpose();
   const Eigen::Vector3d neo = tip("bar_sag_finite", "--model neo-hookean");
-  EXPECT_LT((neo - Eigen::Vector3d(-0.0665, 0.0, -0.3463)).norm(), 0.015 * 0.3526) << neo.transpose();
+  EXPECT_LT((neo - Eigen::Vector3d(-0.0665, 0.0, -0.3463)).norm(), 0.01 * 0.3526) << neo.transpose();
+}
+
+// Linear flesh sags by several lengths if it has to; the answer is one linear system's. 20 x 4 x 4 active
+// cells: measured 1.0 % less than the converged -3.766 m.
+TEST_F(ReferencePoses, TheSoftBarRestsWhereLinearFleshDoes) {
+  const Eigen::Vector3d u = tip("bar_sag", "--model blended");
+  EXPECT_NEAR(u.z(), -3.766, 0.011 * 3.766);
+  EXPECT_LT(std::hypot(u.x(), u.y()), 1e-9);
 }
 
 // Under its full weight the soft bar has no equilibrium with StVK: it folds at 0.465 of it.
 TEST_F(ReferencePoses, TheSoftBarFailsByNameWithStVK) {
   const tests::Outcome run = pose("bar_sag", "--model stvk --levels 1");
   EXPECT_EQ(run.exit_code, 4);
-  EXPECT_NE(run.text.find("bar_sag.toml: "), std::string::npos) << run.text;
+  EXPECT_TRUE(std::regex_search(
+      run.text,
+      std::regex("bar_sag\\.toml: stvk: .*leaf cell [0-9]+ of 'ground' .*; no rest beyond load factor "
+                 "0\\.4[0-9]*")))
+      << run.text;
   EXPECT_FALSE(tests::fs::exists(out("pose")));
 }
 
