@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "fem/growth.h"
+#include "fem/mirror.h"
 
 namespace sinew::fem {
 namespace {
@@ -157,6 +159,10 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
       lattice::uniform_active_set(hierarchy, options.levels, hard_chains(input.lattice));
   lattice::LeafMesh mesh = lattice::leaf_mesh(hierarchy, active);
   check_orientation(mesh);
+  FrameTree tree = frame_tree(input.lattice, input.skeleton, further_frames(input));
+  const std::optional<lattice::MirrorMap> map =
+      further_frames(input).empty() ? lattice::find_mirror_map(input.lattice, input.skin) : std::nullopt;
+  const std::vector<int> partners = map ? lattice::mirrored_vertices(hierarchy, *map) : std::vector<int>{};
 
   // Drop cells without flesh; embed again in what is left, since indices change.
   const lattice::SurfaceQuery query(input.skin.points, input.skin.triangles);
@@ -173,6 +179,7 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   lattice::fill_grazed_octants(mesh, samples.points, fill, [&](int sample, int cell) {
     return limbs.owns_vertex(cell, samples.vertices[static_cast<std::size_t>(sample)]);
   });
+  if (map) symmetrise(body_mirror(*map, partners, tree, mesh), fill);
   std::vector<std::uint8_t> keep = lattice::filled_cells(fill, skin.cell);
   // A coarse cell stays or goes as a whole: were only some of its children kept, a level-0 hat could reach
   // kept cells without having its own vertex there, and it would be a combination of details.
@@ -181,6 +188,8 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
     return static_cast<std::size_t>(lattice::coarse_cell(hierarchy, mesh, static_cast<int>(c)));
   };
   for (std::size_t c = 0; c < keep.size(); ++c) keep_coarse[coarse_of(c)] |= keep[c];
+  for (std::size_t c = 0; map && c < keep_coarse.size(); ++c)
+    if (keep_coarse[c]) keep_coarse[static_cast<std::size_t>(map->cells[c])] = 1;
   rescue_bones(input.lattice, keep_coarse);
   for (std::size_t c = 0; c < keep.size(); ++c) keep[c] = keep_coarse[coarse_of(c)];
   std::vector<lattice::FillFractions> kept_fill;
@@ -192,10 +201,12 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   const lattice::LeafLimbs kept_limbs(input.lattice, hierarchy, mesh, input.skin);
   skin = lattice::embed(mesh, input.skin.points, own_skin(kept_limbs));
 
-  FrameTree tree = frame_tree(input.lattice, input.skeleton, further_frames(input));
+  const std::optional<BodyMirror> mirror =
+      map ? std::optional(body_mirror(*map, partners, tree, mesh)) : std::nullopt;
   BoneConstraints bones = bone_constraints(input.lattice, tree, hierarchy, mesh);
   hold_planes(input.held, tree, mesh, bones);
   FrameWeights weights = frame_weights(hierarchy, mesh, skin, input.skin, tree, bones);
+  if (mirror) symmetrise(*mirror, weights);
 
   const std::vector<Material> of_frame = frame_materials(tree, options);
   std::vector<Material> materials;
@@ -204,7 +215,7 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   LeafMatrices matrices = assemble(mesh, materials, kept_fill);
   std::vector<double> mu_of_frame;
   for (const Material& m : of_frame) mu_of_frame.push_back(m.mu());
-  const LimbRadii radii(input.lattice, tree, input.skin, h);
+  const LimbRadii radii(input.lattice, tree, input.skin, h, map ? &*map : nullptr);
   std::vector<Tie> ties =
       add_ties(input.lattice, tree, radii, mesh, kept_limbs, mu_of_frame, h, options.ties, matrices);
 
@@ -212,6 +223,7 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   for (const auto& pose : input.poses) posed.push_back(pose_frames(tree, pose, 0.0));
   std::vector<Region> regions = make_regions(input.lattice, tree, radii, mesh, weights,
                                              judge_bends(tree, posed, options.regions), options.regions);
+  if (mirror) symmetrise(*mirror, regions);
 
   Body body{input.lattice,
             std::move(hierarchy),

@@ -1,6 +1,7 @@
 #include "fem/default_material.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace sinew::fem {
 namespace {
@@ -40,7 +41,9 @@ double default_young(double thickness, double density, double poisson, double gr
 
 DefaultMaterials default_materials(const DefaultMaterialInput& input) {
   const FrameTree tree = frame_tree(input.lattice, input.skeleton);
-  const LimbRadii radii(input.lattice, tree, input.skin, input.lattice.edge_length);
+  const std::optional<lattice::MirrorMap> mirror = lattice::find_mirror_map(input.lattice, input.skin);
+  const LimbRadii radii(input.lattice, tree, input.skin, input.lattice.edge_length,
+                        mirror ? &*mirror : nullptr);
   DefaultMaterials materials;
   materials.thickness = radii.typical();
   const auto young = [&](double thickness, double motion) {

@@ -48,7 +48,7 @@ int dominant_frame(const std::vector<lattice::Influence>& influences, const Fram
 }  // namespace
 
 LimbRadii::LimbRadii(const lattice::ControlLattice& lattice, const FrameTree& tree,
-                     const lattice::Surface& skin, double window)
+                     const lattice::Surface& skin, double window, const lattice::MirrorMap* mirror)
     : bones_(lattice.bones.size()), window_(window) {
   const std::vector<double> areas = vertex_areas(skin);
   std::vector<std::vector<int>> bones_of_frame(static_cast<std::size_t>(tree.num_frames()));
@@ -86,6 +86,7 @@ LimbRadii::LimbRadii(const lattice::ControlLattice& lattice, const FrameTree& tr
     if (sample.along < -window || sample.along > length + window) continue;
     bones_[static_cast<std::size_t>(nearest)].samples.push_back(sample);
   }
+  if (mirror != nullptr) share(mirror->bones);
   for (std::size_t b = 0; b < bones_.size(); ++b) {
     std::vector<std::pair<double, double>> values;
     for (const Sample& s : bones_[b].samples) values.emplace_back(s.distance, s.area);
@@ -93,6 +94,18 @@ LimbRadii::LimbRadii(const lattice::ControlLattice& lattice, const FrameTree& tr
     if (!(bones_[b].median > 0.0)) {
       bones_[b].median = 0.1 * (lattice.bones[b].rest_end - lattice.bones[b].rest_start).norm();
     }
+  }
+}
+
+/// Gives each bone the samples of its mirror image too. A sample on the plane is as near to one as to the
+/// other, and triangles split in two ways give their corners other areas.
+void LimbRadii::share(const std::vector<int>& partner) {
+  for (std::size_t b = 0; b < bones_.size(); ++b) {
+    const auto other = static_cast<std::size_t>(partner[b]);
+    if (other <= b) continue;
+    std::vector<Sample>& samples = bones_[b].samples;
+    samples.insert(samples.end(), bones_[other].samples.begin(), bones_[other].samples.end());
+    bones_[other].samples = samples;
   }
 }
 

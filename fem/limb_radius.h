@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "fem/frames.h"
+#include "lattice/mirror_map.h"
 #include "lattice/surface.h"
 
 namespace sinew::fem {
@@ -10,9 +11,10 @@ namespace sinew::fem {
 /// How thick the flesh round a bone is.
 class LimbRadii {
  public:
-  /// `window` h [m]: skin that projects onto the bone within it of a point counts there.
+  /// `window` h [m]: skin that projects onto the bone within it of a point counts there. Of a mirrored
+  /// lattice, partners have the skin of both.
   LimbRadii(const lattice::ControlLattice& lattice, const FrameTree& tree, const lattice::Surface& skin,
-            double window);
+            double window, const lattice::MirrorMap* mirror = nullptr);
 
   /// Whole-bone radius [m]: area-weighted median distance to the bone of the skin vertices whose dominant
   /// frame is the bone's; a tenth of its length where there are none.
@@ -31,6 +33,8 @@ class LimbRadii {
     std::vector<Sample> samples;
     double median = 0.0;
   };
+  void share(const std::vector<int>& partner);
+
   std::vector<Bone> bones_;
   double window_ = 0.0;
 };

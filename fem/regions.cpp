@@ -6,6 +6,14 @@
 
 namespace sinew::fem {
 
+namespace {
+
+/// Rounding of an angle between two rotations [rad]: partners in a mirrored motion must be judged alike, and
+/// clips like round angles.
+constexpr double kAngleRounding = 1e-9;
+
+}  // namespace
+
 FrameBends judge_bends(const FrameTree& tree, const std::vector<PosedFrames>& poses,
                        const RegionOptions& options) {
   const auto largest_angle = [&](int a, int b) {
@@ -22,7 +30,7 @@ FrameBends judge_bends(const FrameTree& tree, const std::vector<PosedFrames>& po
     const int parent = tree.frames[static_cast<std::size_t>(f)].parent;
     const int above = parent < 0 ? f : bends.leader[static_cast<std::size_t>(parent)];
     const double angle = parent < 0 ? 0.0 : largest_angle(above, f);
-    const bool merges = parent >= 0 && angle <= options.merge_angle;
+    const bool merges = parent >= 0 && angle <= options.merge_angle + kAngleRounding;
     bends.leader.push_back(merges ? above : f);
     bends.bend.push_back(merges ? 0.0 : angle);
   }
@@ -144,10 +152,11 @@ std::vector<Region> make_regions(const lattice::ControlLattice& lattice, const F
   std::vector<std::vector<int>> joints_of_frame(tree.frames.size());
   for (int f = 0; options.joints && f < tree.num_frames(); ++f) {
     if (tree.frames[static_cast<std::size_t>(f)].parent < 0) continue;
-    if (bends.bend[static_cast<std::size_t>(f)] <= options.joint_angle) continue;
+    if (bends.bend[static_cast<std::size_t>(f)] <= options.joint_angle + kAngleRounding) continue;
     Joint joint = make_joint(lattice, tree, radii, f);
     // The region count is a property of the run, not of the instant, so that weights never jump.
-    joint.num_regions = bends.bend[static_cast<std::size_t>(f)] > 0.5 * std::numbers::pi ? 2 : 1;
+    joint.num_regions =
+        bends.bend[static_cast<std::size_t>(f)] > 0.5 * std::numbers::pi + kAngleRounding ? 2 : 1;
     joint.first_region = static_cast<int>(regions.size());
     for (int k = 0; k < joint.num_regions; ++k) {
       const double t = joint.num_regions == 1 ? 0.5 : (k + 1) / 3.0;

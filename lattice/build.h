@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lattice/control_lattice.h"
+#include "lattice/mirror_map.h"
 #include "lattice/surface.h"
 
 namespace sinew::lattice {
@@ -86,12 +87,6 @@ struct GateFailure {
 struct RefusedAttempt {
   std::string name;  ///< what it was made with, "h x 0.93".
   std::vector<GateFailure> failures;
-};
-
-/// The plane normal . x = offset [m].
-struct MirrorPlane {
-  Eigen::Vector3d normal{1, 0, 0};  ///< of length 1.
-  double offset = 0.0;
 };
 
 struct BuildResult {

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <tuple>
 
 #include "lattice/detail/cell_locator.h"
+#include "lattice/detail/point_finder.h"
 #include "lattice/detail/segments.h"
 #include "lattice/detail/symmetry.h"
 #include "lattice/detail/triangle_grid.h"
@@ -21,7 +23,8 @@ using Eigen::Vector3d;
 constexpr double kLimbDistance = 1.5;
 constexpr double kSoftBoneSpacing = 0.25;  ///< of the points along soft bones, in units of h.
 constexpr double kInsideSlack = 1e-9;
-constexpr double kGridSide = 0.5;  ///< of the grid of triangles, in units of h.
+constexpr double kSamePlace = 1e-9;  ///< of a vertex and the image of its partner, unit coordinates.
+constexpr double kGridSide = 0.5;    ///< of the grid of triangles, in units of h.
 
 bool is_before(const LimbPiece& a, const LimbPiece& b) {
   return std::tie(a.frame, a.stretch.bone) < std::tie(b.frame, b.stretch.bone);
@@ -100,6 +103,7 @@ LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const C
   std::vector<Label> labels(lattice.complex.cells.size());
   label_skin(labels, faces);
   label_bones(labels);
+  if (input.mirror) mirror(labels);
   for (std::size_t c = 0; c < labels.size(); ++c)
     limbs_.push_back(gather(labels[c], edge_at(lattice.complex.cells[c].vertices)));
 }
@@ -225,6 +229,43 @@ void LimbMap::label_bones(std::vector<Label>& labels) const {
   }
 }
 
+LimbPiece LimbMap::image(const LimbPiece& piece) const {
+  LimbPiece result = piece;
+  result.frame = input_.mirror->joint[piece.frame];
+  if (piece.stretch.bone >= 0) result.stretch.bone = skeleton_.mirror_bone[piece.stretch.bone];
+  return result;
+}
+
+void LimbMap::mirror(std::vector<Label>& labels) const {
+  const CellComplex& complex = lattice_.complex;
+  Points points(complex.points.rows(), 3);
+  for (Eigen::Index v = 0; v < points.rows(); ++v)
+    points.row(v) = input_.unit_skin.to_unit(complex.points.row(v).transpose()).transpose();
+  const PointFinder finder(points);
+  std::vector<int> vertex;
+  for (Eigen::Index v = 0; v < points.rows(); ++v)
+    vertex.push_back(finder.first_near(reflected(points.row(v).transpose()), kSamePlace));
+  using Key = std::array<int, 8>;
+  std::map<Key, std::size_t> cell_of;
+  for (std::size_t c = 0; c < complex.cells.size(); ++c) {
+    Key key = complex.cells[c].vertices;
+    std::sort(key.begin(), key.end());
+    cell_of[key] = c;
+  }
+  const std::vector<Label> own = labels;
+  for (std::size_t c = 0; c < complex.cells.size(); ++c) {
+    Key key = complex.cells[c].vertices;
+    for (int& v : key)
+      if (v >= 0) v = vertex[v];
+    std::sort(key.begin(), key.end());
+    const auto found = cell_of.find(key);
+    if (found == cell_of.end()) continue;
+    for (const LimbPiece& piece : own[found->second].pieces) merge(labels[c].pieces, image(piece));
+    for (const auto& [a, b] : own[found->second].joined)
+      labels[c].joined.push_back({input_.mirror->joint[a], input_.mirror->joint[b]});
+  }
+}
+
 std::vector<Limb> LimbMap::gather(const Label& label, double edge) const {
   std::vector<LimbPiece> pieces = label.pieces;
   std::sort(pieces.begin(), pieces.end(), is_before);
@@ -287,8 +328,9 @@ double LimbMap::edge_at(std::span<const int> vertices) const {
   return sum / count;
 }
 
-Limb LimbMap::flesh_at(const Vector3d& p) const {
+std::optional<Limb> LimbMap::own_flesh_at(const Vector3d& p) const {
   const UnitSkin& skin = input_.unit_skin;
+  if (!skin.is_inside(p)) return std::nullopt;
   const SurfaceQuery::Closest closest = skin.query.closest(p);
   int nearest = -1;
   double best = std::numeric_limits<double>::infinity();
@@ -297,8 +339,18 @@ Limb LimbMap::flesh_at(const Vector3d& p) const {
     const double d = (skin.points.row(v).transpose() - closest.point).squaredNorm();
     if (d < best) best = d, nearest = frame_of_vertex_[v];
   }
-  if (nearest < 0) return {};
-  return {piece_at(nearest, closest.point)};
+  return nearest < 0 ? Limb{} : Limb{piece_at(nearest, closest.point)};
+}
+
+std::vector<Limb> LimbMap::flesh_at(const Vector3d& p) const {
+  std::vector<Limb> flesh;
+  if (std::optional<Limb> own = own_flesh_at(p)) flesh.push_back(std::move(*own));
+  if (!input_.mirror) return flesh;
+  if (std::optional<Limb> other = own_flesh_at(reflected(p))) {
+    for (LimbPiece& piece : *other) piece = image(piece);
+    flesh.push_back(std::move(*other));
+  }
+  return flesh;
 }
 
 Limb LimbMap::bone_at(int bone, const Vector3d& p) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,6 +33,9 @@ using Limb = std::vector<LimbPiece>;
 /// Which limbs lie in which cell. Skin and bones in a cell are of one limb if they follow the same frame, if
 /// one triangle of the skin hangs on both, or if they are less than 1.5 h apart along the skeleton, h the
 /// target edge of the place.
+///
+/// Of a mirrored rig what is found in a place is also there in its mirror image: triangles may be split in
+/// two ways, and a vertex in the plane follows one frame of two alike.
 class LimbMap {
  public:
   /// `faces` are those of `lattice.complex`; everything must outlive the map.
@@ -46,8 +50,9 @@ class LimbMap {
   bool are_together(const Limb& a, const Limb& b, double edge) const;
   /// Mean target edge at vertices of the lattice (-1: none), unit coordinates.
   double edge_at(std::span<const int> vertices) const;
-  /// Of the flesh at p (unit coordinates, inside the skin): as the closest skin.
-  Limb flesh_at(const Eigen::Vector3d& p) const;
+  /// Of the flesh at p (unit coordinates): as the closest skin; of a mirrored rig also as the image of what
+  /// is at the image of p. None outside the skin.
+  std::vector<Limb> flesh_at(const Eigen::Vector3d& p) const;
   /// Of the bone at a vertex of its chain.
   Limb bone_at(int bone, const Eigen::Vector3d& p) const;
   /// The frame of every joint before floating parts get soft frames of their own.
@@ -69,6 +74,9 @@ class LimbMap {
   void add_triangle(Label& label, const std::array<int, 3>& frames, const Eigen::Vector3d& p) const;
   void label_skin(std::vector<Label>& labels, const std::vector<CellFace>& faces) const;
   void label_bones(std::vector<Label>& labels) const;
+  void mirror(std::vector<Label>& labels) const;
+  LimbPiece image(const LimbPiece& piece) const;
+  std::optional<Limb> own_flesh_at(const Eigen::Vector3d& p) const;
   std::vector<Limb> gather(const Label& label, double edge) const;
 
   const RigInput& input_;

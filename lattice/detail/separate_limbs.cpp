@@ -43,7 +43,7 @@ class Separation {
   void number_instances();
   int link(const CellFace& face);
   bool is_single(int cell) const { return first_[cell + 1] - first_[cell] == 1; }
-  std::vector<Vector3d> flesh_on(const CellFace& face) const;
+  std::vector<Limb> flesh_on(const CellFace& face) const;
   int owner(int cell, const Limb& flesh) const;
   std::vector<std::vector<int>> parts_at(const std::vector<int>& star, const std::vector<int>& faces,
                                          double edge) const;
@@ -75,9 +75,9 @@ void Separation::number_instances() {
   first_.push_back(static_cast<int>(instances_.size()));
 }
 
-/// Points of a face that lie inside the skin: of its mean, corners (drawn in a little), edge midpoints and
-/// half-way to the corners.
-std::vector<Vector3d> Separation::flesh_on(const CellFace& face) const {
+/// The flesh at some points of a face: its mean, corners (drawn in a little), edge midpoints and half-way to
+/// the corners.
+std::vector<Limb> Separation::flesh_on(const CellFace& face) const {
   const int n = face.vertices[3] < 0 ? 3 : 4;
   std::array<Vector3d, 4> corners;
   Vector3d mean = Vector3d::Zero();
@@ -85,14 +85,17 @@ std::vector<Vector3d> Separation::flesh_on(const CellFace& face) const {
     corners[k] = input_.unit_skin.to_unit(lattice_.complex.points.row(face.vertices[k]).transpose());
     mean += corners[k] / n;
   }
-  std::vector<Vector3d> points{mean};
+  std::vector<Limb> flesh;
+  const auto add = [&](const Vector3d& p) {
+    for (Limb& limb : limbs_.flesh_at(p)) flesh.push_back(std::move(limb));
+  };
+  add(mean);
   for (int k = 0; k < n; ++k) {
-    points.push_back(0.9 * corners[k] + 0.1 * mean);
-    points.push_back(0.5 * corners[k] + 0.5 * mean);
-    points.push_back(0.45 * (corners[k] + corners[(k + 1) % n]) + 0.1 * mean);
+    add(0.9 * corners[k] + 0.1 * mean);
+    add(0.5 * corners[k] + 0.5 * mean);
+    add(0.45 * (corners[k] + corners[(k + 1) % n]) + 0.1 * mean);
   }
-  std::erase_if(points, [&](const Vector3d& p) { return !input_.unit_skin.is_inside(p); });
-  return points;
+  return flesh;
 }
 
 /// The instance of a cell that flesh belongs to: the nearest along the skeleton.
@@ -121,8 +124,7 @@ int Separation::link(const CellFace& face) {
     for (int i = first_[face.first]; i < first_[face.first + 1]; ++i)
       for (int k = first_[face.second]; k < first_[face.second + 1]; ++k)
         if (limbs_.are_together(instances_[i].limb, instances_[k].limb, edge)) links.insert({i, k});
-    for (const Vector3d& p : flesh_on(face)) {
-      const Limb flesh = limbs_.flesh_at(p);
+    for (const Limb& flesh : flesh_on(face)) {
       links.insert({owner(face.first, flesh), owner(face.second, flesh)});
     }
   }

@@ -11,6 +11,8 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "lattice/detail/point_finder.h"
+
 namespace sinew::lattice::detail {
 namespace {
 
@@ -19,31 +21,6 @@ using Eigen::Vector3d;
 /// Two partners may differ by this share of the skin that hangs on them, plus kStrayWeight of the whole skin:
 /// weights are painted in steps of a percent.
 constexpr double kWeightShare = 0.02, kStrayWeight = 1e-3;
-
-/// Points by their position along a direction in which no two points of a grid coincide.
-class PointFinder {
- public:
-  explicit PointFinder(const Points& points) : points_(points), order_(points.rows()) {
-    std::iota(order_.begin(), order_.end(), 0);
-    for (Eigen::Index i = 0; i < points.rows(); ++i) key_.push_back(points.row(i).dot(kDirection));
-    std::sort(order_.begin(), order_.end(),
-              [&](int a, int b) { return key_[a] != key_[b] ? key_[a] < key_[b] : a < b; });
-  }
-  bool has_near(const Vector3d& p, double tolerance) const {
-    const double key = p.dot(kDirection.transpose());
-    auto it = std::lower_bound(order_.begin(), order_.end(), key - tolerance,
-                               [&](int i, double k) { return key_[i] < k; });
-    for (; it != order_.end() && key_[*it] <= key + tolerance; ++it)
-      if ((points_.row(*it).transpose() - p).norm() <= tolerance) return true;
-    return false;
-  }
-
- private:
-  inline static const Eigen::RowVector3d kDirection = Eigen::RowVector3d(0.53, 0.73, 0.43).normalized();
-  const Points& points_;
-  std::vector<int> order_;
-  std::vector<double> key_;
-};
 
 struct Plane {
   Vector3d normal;

@@ -15,6 +15,7 @@
 #include "lattice/detail/retries.h"
 #include "lattice/detail/rig_input.h"
 #include "tests/lattice/limbs.h"
+#include "tests/lattice/mirrored.h"
 
 namespace sinew::lattice {
 namespace {
@@ -133,38 +134,6 @@ TEST(Build, DoesNotGlueTwoLegsAcrossTheirGap) {
   EXPECT_LT(places.size(), static_cast<std::size_t>(points.rows())) << "no vertex was doubled";
 }
 
-/// Expects that points and cells are their own mirror image in a plane to 1e-9 of the lattice's size; copies
-/// of a vertex at one place count once.
-void expect_mirrored(const ControlLattice& lattice, const MirrorPlane& plane) {
-  const Points& points = lattice.complex.points;
-  const double size = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
-  std::vector<int> image(points.rows());
-  for (Eigen::Index v = 0; v < points.rows(); ++v) {
-    const Vector3d p = points.row(v).transpose();
-    const Vector3d q = p - 2.0 * (plane.normal.dot(p) - plane.offset) * plane.normal;
-    Eigen::Index nearest = 0;
-    ASSERT_LT(std::sqrt((points.rowwise() - q.transpose()).rowwise().squaredNorm().minCoeff(&nearest)),
-              1e-9 * size)
-        << "vertex " << v;
-    image[v] = static_cast<int>(nearest);
-  }
-  const auto place = [&](int v) {  // the lowest vertex there
-    Eigen::Index first = 0;
-    (points.rowwise() - points.row(v)).rowwise().squaredNorm().minCoeff(&first);
-    return static_cast<int>(first);
-  };
-  std::multiset<std::array<int, 4>> cells, images;
-  for (const Cell& cell : lattice.complex.cells) {
-    std::array<int, 4> here, there;
-    for (int k = 0; k < 4; ++k) here[k] = place(cell.vertices[k]), there[k] = place(image[cell.vertices[k]]);
-    std::sort(here.begin(), here.end());
-    std::sort(there.begin(), there.end());
-    cells.insert(here);
-    images.insert(there);
-  }
-  EXPECT_EQ(cells, images);
-}
-
 TEST(Build, MirrorsTheLatticeOfAMirroredRig) {
   const tests::Character legs = tests::two_legs();
   for (const int cells : {150, 500}) {
@@ -172,7 +141,7 @@ TEST(Build, MirrorsTheLatticeOfAMirroredRig) {
     EXPECT_THAT(result.failures, testing::IsEmpty());
     ASSERT_TRUE(result.mirror) << result.no_mirror;
     EXPECT_EQ(result.mirror->normal, Vector3d(1, 0, 0));
-    expect_mirrored(result.lattice, *result.mirror);
+    tests::expect_mirrored(result.lattice, *result.mirror);
     expect_sound(result.lattice, legs);
     // Bones of both sides are partners: the same names but for the side.
     std::multiset<std::string> left, right;
@@ -198,7 +167,7 @@ TEST(Build, MirrorsInAnyPlane) {
   ASSERT_TRUE(result.mirror) << result.no_mirror;
   // From the eigenvectors of the vertices' covariance: 1e-16 over the gap of its eigenvalues.
   EXPECT_NEAR(std::abs(result.mirror->normal.dot(turn * Vector3d::UnitX())), 1.0, 1e-12);
-  expect_mirrored(result.lattice, *result.mirror);
+  tests::expect_mirrored(result.lattice, *result.mirror);
   expect_sound(result.lattice, legs);
 }
 
