@@ -16,6 +16,9 @@ constexpr double kBoneSpacing = 1.1;  ///< of bone samples, in units of h.
 /// Grid points farther from the skin than this are in no cell that touches it: the longest edge of a cell of
 /// the body-centred grid is 1.155 h.
 constexpr double kGridReach = 1.2;
+/// The same in the plane of a half, where cells have the diagonal of a cube's side for an edge, 1.633 h:
+/// without a corner of it the skin there would be left to cells that reach far away.
+constexpr double kPlaneReach = 1.68;
 /// Half the length of a bone piece, and a little more for rounding.
 constexpr double kMiddleBall = 0.51;
 /// Bone pieces are looked for this far away, in units of h.
@@ -146,7 +149,8 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
   }
   // Cubes of side 2h/sqrt(3) with a point in the middle: neighbours along a diagonal are h apart.
   const double side = 2.0 * h / std::sqrt(3.0);
-  const Vector3d reach = skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() + kGridReach * h;
+  const Vector3d reach = skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() +
+                         (out.half ? kPlaneReach : kGridReach) * h;
   Vector3d shift = Vector3d::Constant(options.shift * side);
   if (out.half) shift.x() = 0.0;
   const Eigen::Vector3i count = (2.0 * reach / side).array().ceil().cast<int>() + 1;
@@ -156,7 +160,8 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
         if ((i - j) % 2 != 0 || (j - k) % 2 != 0) continue;  // all even or all odd
         const Vector3d p = 0.5 * side * Vector3d(i, j, k) + shift;
         if ((p.cwiseAbs().array() > reach.array()).any()) continue;
-        if (!skin.query.is_within(p, kGridReach * h) && !skin.is_inside(p)) continue;
+        const double near = (out.half && i == 0 ? kPlaneReach : kGridReach) * h;
+        if (!skin.query.is_within(p, near) && !skin.is_inside(p)) continue;
         if (!clearance.is_too_close(p)) out.add(p, {});
       }
   return out;
