@@ -28,6 +28,10 @@ using namespace detail;
 /// Steps of the search for h, and when the count of cells is close enough.
 constexpr int kSearchSteps = 8;
 constexpr double kCloseEnough = 0.05;
+/// Where the shape of cells needs no second look: what the worst cell of most lattices reaches. Below so many
+/// cells it gets one.
+constexpr double kGoodDihedral = 26.0, kGoodJacobian = 0.28;
+constexpr int kFewCells = 1500;
 
 /// A lattice in unit coordinates.
 struct Draft {
@@ -210,6 +214,26 @@ Outcome try_grid(const RigInput& input, const BuildOptions& options) {
   return judged(hexahedral_lattice(input, side, reduction), input, options);
 }
 
+/// Other places of the grid for a lattice that passed. The worst of a few hundred cells depends much on where
+/// the grid lies, and where cells are few another grid costs little.
+void try_other_grids(const RigInput& input, double h, const BuildOptions& options, Outcome& best) {
+  const auto cells = [](const Outcome& o) { return static_cast<int>(o.lattice.complex.cells.size()); };
+  const auto is_good = [](const LatticeQuality& q) {
+    return q.min_dihedral_degrees >= kGoodDihedral && q.min_scaled_jacobian >= kGoodJacobian;
+  };
+  if (options.max_retries == 0 || cells(best) > kFewCells) return;
+  const double allowed = options.cell_size
+                             ? std::numeric_limits<double>::infinity()
+                             : std::max(std::abs(cells(best) - options.cells), options.cells / 10);
+  for (const Attempt& attempt : moved_grids(options)) {
+    if (is_good(best.found.quality)) return;
+    Outcome other = try_out(input, h, attempt, options);
+    if (other.failures.empty() && std::abs(cells(other) - options.cells) <= allowed &&
+        is_better(other, best, options))
+      best = std::move(other);
+  }
+}
+
 /// The first attempt that passes, or the best of all.
 BuildResult best_attempt_of(const RigInput& input, const BuildOptions& options) {
   const std::vector<Attempt> planned = planned_attempts(options);
@@ -225,6 +249,7 @@ BuildResult best_attempt_of(const RigInput& input, const BuildOptions& options) 
     return best->failures.empty();
   };
   bool passed = passes(planned.front());
+  if (passed) try_other_grids(input, h, options, *best);
   const bool grid_is_idle = !passed && is_shaped_by_bones(best->lattice, best->found, options);
   for (std::size_t i = 1; i < planned.size() && !passed; ++i)
     if (!(grid_is_idle && planned[i].moves_grid_only)) passed = passes(planned[i]);

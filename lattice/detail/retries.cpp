@@ -63,6 +63,16 @@ std::vector<Attempt> planned_attempts(const BuildOptions& options) {
   return list;
 }
 
+std::vector<Attempt> moved_grids(const BuildOptions& options) {
+  std::vector<Attempt> list;
+  for (const double shift : {0.25, 0.125, 0.375}) {
+    list.push_back(planned_attempts(options).front());
+    list.back().points.shift = shift;
+    list.back().moves_grid_only = true;
+  }
+  return list;
+}
+
 bool is_shaped_by_bones(const ControlLattice& lattice, const Inspection& found, const BuildOptions& options) {
   std::set<std::pair<int, int>> pieces;
   for (const LatticeBone& bone : lattice.bones)

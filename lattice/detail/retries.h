@@ -23,6 +23,9 @@ struct Attempt {
 /// The attempts in order, cheapest change first; at most max_retries + 1.
 std::vector<Attempt> planned_attempts(const BuildOptions& options);
 
+/// The first attempt with the grid elsewhere: other cells of the same size, some better shaped than others.
+std::vector<Attempt> moved_grids(const BuildOptions& options);
+
 /// True where a refused cell has three pieces of bones at one corner: its shape there is given, whatever the
 /// grid.
 bool is_shaped_by_bones(const ControlLattice& lattice, const Inspection& found, const BuildOptions& options);
