@@ -24,6 +24,8 @@ constexpr double kTipReach = 0.8;
 /// A tip bone of a contracted joint must be this long, in units of h: five fingers contracted into a hand
 /// shall not become five bones out of one point.
 constexpr double kContractedTip = 1.0;
+/// A chained bone may turn by so many degrees where it goes on.
+constexpr double kSharpestChain = 60.0;
 
 class Reduction {
  public:
@@ -73,6 +75,7 @@ class Reduction {
   void place_nodes();
   void chain_siblings();
   bool chain_one_pair();
+  bool lie_side_by_side(const ReducedBone& shorter, const ReducedBone& longer) const;
   void soften_close_bones();
   void soften_wanted_bones();
   void soften_bones_at_their_image();
@@ -192,6 +195,15 @@ void Reduction::chain_siblings() {
   }
 }
 
+/// True for two bones out of one node, at a small angle, of which the longer could not go on behind the
+/// shorter but would have to turn aside there: the two legs of a biped whose hips are one node.
+bool Reduction::lie_side_by_side(const ReducedBone& shorter, const ReducedBone& longer) const {
+  const Vector3d on = end(longer) - end(shorter);
+  if (on.norm() <= options_.too_close * h_) return false;  // one place
+  const double turn = std::cos(kSharpestChain * std::numbers::pi / 180.0);
+  return on.normalized().dot((end(shorter) - start(shorter)).normalized()) < turn;
+}
+
 /// Two bones out of one node that nearly coincide: the longer starts behind the shorter.
 bool Reduction::chain_one_pair() {
   const double cosine = std::cos(options_.chain_degrees * std::numbers::pi / 180.0);
@@ -214,6 +226,14 @@ bool Reduction::chain_one_pair() {
                         joints_.names[result_.nodes[longer.start].joint],
                         std::acos(std::min(1.0, u.dot(v))) * 180.0 / std::numbers::pi,
                         joints_.names[result_.nodes[longer.end].joint]));
+        return true;
+      }
+      if (lie_side_by_side(shorter, longer)) {
+        soften(static_cast<int>(swap ? k : i),
+               fmt::format("it leaves '{}' within {:.0f} degrees of the bone to '{}', beside which it ends",
+                           joints_.names[result_.nodes[longer.start].joint],
+                           std::acos(std::min(1.0, u.dot(v))) * 180.0 / std::numbers::pi,
+                           joints_.names[result_.nodes[longer.end].joint]));
         return true;
       }
       const int joint = result_.nodes[longer.end].joint;

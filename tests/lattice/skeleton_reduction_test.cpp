@@ -117,6 +117,24 @@ TEST(SkeletonReduction, ChainsSiblingsThatNearlyCoincide) {
   EXPECT_EQ(bone->frame, 0);
 }
 
+TEST(SkeletonReduction, ChainsNoLegBehindTheOther) {
+  // At edges of 0.55 the hips are one node with the pelvis, and the thighs leave it 18 degrees apart: a thigh
+  // cannot go on from the knee of the other leg.
+  const tests::Character legs = tests::two_legs();
+  const RigInput input = make_rig_input(legs.skin, legs.joints, {.symmetry = Symmetry::Off});
+  const ReducedSkeleton skeleton =
+      reduce_skeleton(input.unit_skin, input.unit_joints, input.weights, 0.55 / input.unit_skin.scale, {});
+  EXPECT_THAT(changes(skeleton), testing::Contains("right_hip contracted"));
+  EXPECT_THAT(changes(skeleton), testing::Not(testing::Contains(testing::HasSubstr("chained"))));
+  int soft = 0;
+  for (const ReducedBone& bone : skeleton.bones) {
+    soft += bone.soft;
+    const Vector3d from = skeleton.nodes[bone.start].position, to = skeleton.nodes[bone.end].position;
+    EXPECT_GE(from.x() * to.x(), 0.0) << bone.name << " runs from leg to leg";
+  }
+  EXPECT_EQ(soft, 1);
+}
+
 TEST(SkeletonReduction, SoftensOneOfTwoBonesThatCross) {
   tests::Character c = body();
   const int a = c.add_joint("strut_a", -1, {-0.25, 0.6, 0});
