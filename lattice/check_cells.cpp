@@ -7,6 +7,8 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "lattice/detail/cell_locator.h"
+#include "lattice/detail/cell_overlap.h"
 #include "lattice/detail/place_grid.h"
 #include "lattice/hierarchy.h"
 #include "lattice/quality.h"
@@ -95,6 +97,38 @@ double distance(const CellComplex& complex, const Face& face, const Vector3d& p)
   return nearest;
 }
 
+using Box = Eigen::AlignedBox<double, 3>;
+
+Box box_of(const CellComplex& complex, const Cell& cell) {
+  Box box;
+  for (int k = 0; k < num_corners(cell.type); ++k) box.extend(point(complex, cell.vertices[k]));
+  return box;
+}
+
+/// True where the plane of some face of one cell has this cell behind it and the other one beyond, but for a
+/// layer of thickness `layer`: quick, and so for nearly all neighbours.
+bool is_separated(const CellComplex& complex, const Cell& one, const Cell& other, double layer) {
+  const auto all_of = [&](const Cell& cell, const auto& holds) {
+    for (int k = 0; k < num_corners(cell.type); ++k)
+      if (!holds(point(complex, cell.vertices[k]))) return false;
+    return true;
+  };
+  for (const std::array<int, 4>& face : cell_faces(one.type)) {
+    const auto corner = [&](int k) { return point(complex, one.vertices[face[k]]); };
+    const bool is_triangle = face[3] < 0;
+    const Vector3d across = corner(2) - corner(0),
+                   along = (is_triangle ? corner(1) - corner(0) : corner(3) - corner(1));
+    // Of outward faces: (2-0) x (3-1) points out, and so does (1-0) x (2-0).
+    const Vector3d normal = (is_triangle ? along.cross(across) : across.cross(along)).stableNormalized();
+    const Vector3d mean =
+        is_triangle ? corner(0) : Vector3d(0.25 * (corner(0) + corner(1) + corner(2) + corner(3)));
+    if (all_of(one, [&](const Vector3d& p) { return normal.dot(p - mean) <= layer; }) &&
+        all_of(other, [&](const Vector3d& p) { return normal.dot(p - mean) >= -layer; }))
+      return true;
+  }
+  return false;
+}
+
 class Judge {
  public:
   Judge(const CellComplex& complex, const Numbering& numbering)
@@ -110,7 +144,9 @@ class Judge {
     if (coincidence == Coincidence::Refused) {
       doubled_vertices();
       shared_faces();
-      if (lines_.empty()) hanging_vertices();  // would repeat what was said
+      // Would repeat what was said.
+      if (lines_.empty()) hanging_vertices();
+      if (lines_.empty()) overlaps();
     }
     return std::move(lines_);
   }
@@ -314,6 +350,37 @@ class Judge {
            fmt::format("has vertex {} inside one of its faces or edges, expected faces that match",
                        vertex(hanging.begin()->second)),
            "split the cells round hanging vertices");
+  }
+
+  /// Cells that lie in each other, though no face says so: parts that are not joined, or a folded mesh.
+  void overlaps() {
+    const detail::CellLocator locator(complex_);
+    std::vector<int> cells, near;
+    std::string first;
+    for (std::size_t c = 0; c < complex_.cells.size(); ++c) {
+      const Box box = box_of(complex_, complex_.cells[c]);
+      locator.find_near(box.min(), box.max(), near);
+      for (int other : near) {
+        if (other <= static_cast<int>(c)) continue;
+        const Cell& with = complex_.cells[static_cast<std::size_t>(other)];
+        const Box common = box.intersection(box_of(complex_, with));
+        const double layer = 0.5 * same_place_;
+        if (common.isEmpty() || is_separated(complex_, complex_.cells[c], with, layer) ||
+            is_separated(complex_, with, complex_.cells[c], layer))
+          continue;
+        // Rounded coordinates: a layer that thick over the largest section of what they can have in common.
+        const Vector3d size = common.sizes();
+        const double section = std::max({size.x() * size.y(), size.y() * size.z(), size.z() * size.x()});
+        const double volume = detail::overlap_volume(complex_, complex_.cells[c], with);
+        if (!(volume > 2.0 * same_place_ * section)) continue;
+        if (cells.empty())
+          first = fmt::format("overlaps cell {}: they have {:.3g} m^3 in common, expected none", cell(other),
+                              volume);
+        cells.push_back(static_cast<int>(c));
+        break;
+      }
+    }
+    report(cells, first, "join the parts of the mesh, or move them apart");
   }
 
   const CellComplex& complex_;

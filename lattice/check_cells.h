@@ -41,7 +41,8 @@ void orient_cells(CellComplex& complex);
 ///   Jacobian that is not positive;
 /// - two vertices at one place;
 /// - a face of three cells, or of two on the same side of it;
-/// - faces that do not match: a quadrilateral against triangles, a vertex inside somebody's face or edge.
+/// - faces that do not match: a quadrilateral against triangles, a vertex inside somebody's face or edge;
+/// - two cells that have a volume in common, more than what kSamePlace explains.
 /// Indices must be in range.
 std::vector<std::string> cell_faults(const CellComplex& complex, const Numbering& numbering = {},
                                      Coincidence coincidence = Coincidence::Refused);

@@ -69,6 +69,19 @@ Eigen::Vector3i CellLocator::grid_cell(const Vector3d& p) const {
   return scaled.max(0.0).min((count_.array() - 1).cast<double>()).cast<int>();
 }
 
+void CellLocator::find_near(const Vector3d& low, const Vector3d& high, std::vector<int>& cells) const {
+  cells.clear();
+  const Eigen::Vector3i first = grid_cell(low), last = grid_cell(high);
+  for (int i = first.x(); i <= last.x(); ++i)
+    for (int j = first.y(); j <= last.y(); ++j)
+      for (int k = first.z(); k <= last.z(); ++k) {
+        const std::vector<int>& here = cells_[(i * count_.y() + j) * count_.z() + k];
+        cells.insert(cells.end(), here.begin(), here.end());
+      }
+  std::sort(cells.begin(), cells.end());
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+}
+
 int CellLocator::find(const Vector3d& p, double slack) const {
   const Eigen::Vector3i g = grid_cell(p);
   for (int c : cells_[(g.x() * count_.y() + g.y()) * count_.z() + g.z()])

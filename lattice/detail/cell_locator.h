@@ -20,6 +20,8 @@ class CellLocator {
   int find(const Eigen::Vector3d& p, double slack) const;
   /// All cells that hold p, ascending.
   void find_all(const Eigen::Vector3d& p, double slack, std::vector<int>& cells) const;
+  /// All cells whose box meets the box from low to high, and some near it, ascending.
+  void find_near(const Eigen::Vector3d& low, const Eigen::Vector3d& high, std::vector<int>& cells) const;
 
  private:
   Eigen::Vector3i grid_cell(const Eigen::Vector3d& p) const;

@@ -5,6 +5,7 @@
 
 #include "lattice/box.h"
 #include "lattice/build.h"
+#include "lattice/detail/cell_overlap.h"
 #include "tests/lattice/lattices.h"
 
 namespace sinew::lattice {
@@ -168,6 +169,60 @@ TEST(CheckCells, NamesHangingVertices) {
   for (int& v : cube.vertices) v = corner[static_cast<std::size_t>(v)];
   fine.cells.push_back(cube);
   EXPECT_THAT(cell_faults(fine), ElementsAre(StartsWith("cell 8: has vertex ")));
+}
+
+/// Two cubes of side 1 in one complex that share no vertex, the second one moved.
+CellComplex two_cubes(CellType type, const Eigen::RowVector3d& move) {
+  CellComplex complex = box(type, {1, 1, 1});
+  const CellComplex second = complex;
+  const auto count = static_cast<int>(complex.points.rows());
+  complex.points.conservativeResize(2 * count, 3);
+  complex.points.bottomRows(count) = second.points.rowwise() + move;
+  for (Cell cell : second.cells) {
+    for (int k = 0; k < num_corners(cell.type); ++k) cell.vertices[static_cast<std::size_t>(k)] += count;
+    complex.cells.push_back(cell);
+  }
+  return complex;
+}
+
+TEST(CheckCells, FindsCellsThatOverlapWithoutACommonVertex) {
+  // 0.25 x 0.5 x 0.75 in common, whatever the cubes are cut into.
+  const Eigen::RowVector3d into(0.75, 0.5, 0.25);
+  EXPECT_THAT(
+      cell_faults(two_cubes(CellType::Hexahedron, into)),
+      ElementsAre("cell 0: overlaps cell 1: they have 0.0938 m^3 in common, expected none; hint: join the "
+                  "parts of the mesh, or move them apart"));
+  for (const CellType type : {CellType::Hexahedron, CellType::Wedge, CellType::Tetrahedron}) {
+    const CellComplex complex = two_cubes(type, into);
+    const std::size_t half = complex.cells.size() / 2;
+    double sum = 0.0;
+    for (std::size_t a = 0; a < half; ++a)
+      for (std::size_t b = half; b < 2 * half; ++b)
+        sum += detail::overlap_volume(complex, complex.cells[a], complex.cells[b]);
+    EXPECT_NEAR(sum, 0.25 * 0.5 * 0.75, 1e-14);  // rounding of sums of a few hundred pieces
+    EXPECT_THAT(cell_faults(complex), ElementsAre(HasSubstr(": overlaps cell ")));
+  }
+}
+
+TEST(CheckCells, CellsThatOnlyTouchDoNotOverlap) {
+  // A bar across another one: no vertex lies on a face. Touching, and with less in common than rounding to
+  // six digits explains; then with more.
+  CellComplex cross = two_cubes(CellType::Hexahedron, {0, 0, 1});
+  cross.points.topRows(8).col(0) *= 3.0;
+  cross.points.bottomRows(8).col(0).array() += 1.0;
+  cross.points.bottomRows(8).col(1) = 3.0 * cross.points.bottomRows(8).col(1).array() - 1.0;
+  EXPECT_THAT(cell_faults(cross), IsEmpty());
+  cross.points.bottomRows(8).col(2).array() -= 1e-7;
+  EXPECT_THAT(cell_faults(cross), IsEmpty());
+  cross.points.bottomRows(8).col(2).array() -= 1e-3;
+  EXPECT_THAT(cell_faults(cross), ElementsAre(StartsWith("cell 0: overlaps cell 1: they have 0.001 m^3")));
+  // Inside each other's box only.
+  CellComplex apart = two_tetrahedra();
+  apart.points.conservativeResize(8, 3);
+  apart.points.bottomRows(3) << 0.9, 0.9, 0.1, 0.9, 0.9, 0.9, 0.6, 0.9, 0.9;
+  apart.cells.push_back(tetrahedron(5, 7, 6, add_vertex(apart, {0.9, 0.6, 0.9})));
+  orient_cells(apart);
+  EXPECT_THAT(cell_faults(apart), IsEmpty());
 }
 
 TEST(CheckCells, ListsTwentyOfAKindAndCountsTheRest) {
