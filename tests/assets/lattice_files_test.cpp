@@ -152,6 +152,12 @@ void expect_same_lattice(const lattice::ControlLattice& in, const lattice::Contr
   EXPECT_EQ(in.quality.volume_ratio, out.quality.volume_ratio);
   EXPECT_EQ(in.quality.skin_vertices_outside, 0);
   EXPECT_EQ(in.regions, out.regions);
+  ASSERT_EQ(in.copies.size(), out.copies.size());
+  for (std::size_t i = 0; i < in.copies.size(); ++i) {
+    EXPECT_EQ(in.copies[i].cell, out.copies[i].cell);
+    EXPECT_EQ(in.copies[i].place, out.copies[i].place);
+    EXPECT_EQ(in.copies[i].frames, out.copies[i].frames);
+  }
   ASSERT_EQ(in.region_names.size(), out.region_names.size());
   for (std::size_t r = 0; r < in.region_names.size(); ++r) {
     EXPECT_EQ(in.region_names[r].number, out.region_names[r].number);
@@ -245,7 +251,9 @@ TEST(LatticeFiles, CoincidentVerticesOfOurOwnLatticesAreNoFault) {
   out.complex.points.conservativeResize(fresh + 1, 3);
   out.complex.points.row(fresh) = out.complex.points.row(copy.vertices[corner]).eval();
   copy.vertices[corner] = static_cast<int>(fresh);
+  const auto place = static_cast<int>(out.complex.cells.size()) - 1;
   out.complex.cells.push_back(copy);
+  out.copies = {{place, place, {0}}, {place + 1, place, {1}}};
   out.quality = lattice::measure_quality(out, input.skin.surface);
   for (const NamedFormat& format : kAllFormats) {
     SCOPED_TRACE(format.format);
