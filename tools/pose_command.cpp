@@ -174,6 +174,12 @@ void find_pose(const PoseRequest& request) {
     return;
   }
   const auto talk = [](const std::string& line) { std::cerr << line << '\n'; };
+  if (scene.plain && !scene.plain->is_held())
+    throw assets::ConfigError(
+        scene.source.path +
+        ": bone: none and no fixed side, expected something that holds the flesh at rest; hint: [[fixed]] "
+        "face = \"x-min\"");
+  if (scene.plain && scene.plain->velocity) talk("warning: a pose is at rest: the velocity does nothing");
   assets::OutputDirectory out(
       scene.output, scene.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse, kPoseOutputs);
   const Character character = make_character(scene, talk);

@@ -348,6 +348,22 @@ TEST_F(PlainPoses, ReportStrainStressAndEnergyOfEveryCell) {
   }
 }
 
+TEST_F(PlainPoses, NeedSomethingThatHoldsTheFlesh) {
+  const auto pose = [&](const std::string& text) {
+    return tests::run(tests::command_line("pose " + tests::quoted(file(text)) + " --overwrite -o " +
+                                          tests::quoted(out("pose"))));
+  };
+  const std::string box = "young = 1e5\n[lattice]\nbox = [1, 1, 1]\n";
+  const tests::Outcome free = pose(box);
+  EXPECT_EQ(free.exit_code, 2);
+  EXPECT_THAT(free.text,
+              HasSubstr("scene.toml: bone: none and no fixed side, expected something that holds"));
+  EXPECT_FALSE(fs::exists(out("pose")));
+  const tests::Outcome moving = pose(box + "[[fixed]]\nface = \"x-min\"\n[velocity]\nspin = [0, 0, 1]");
+  EXPECT_EQ(moving.exit_code, 0);
+  EXPECT_THAT(moving.text, HasSubstr("warning: a pose is at rest: the velocity does nothing"));
+}
+
 // A dead load on the side of a bending bar keeps its direction; a pressure turns with the surface and so
 // pulls the tip back: at first alike, then bent less far along x than the dead load makes it.
 TEST_F(PlainPoses, TellFollowingPressureFromDeadTraction) {
