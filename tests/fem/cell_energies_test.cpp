@@ -244,6 +244,28 @@ TEST(NeoHookean, PullsAsItsClosedFormSays) {
   }
 }
 
+// The curves once more with nothing but the pull given away: the width at which the sides are free is sought.
+TEST(NonlinearCells, FindTheirWidthAndPullInUniaxialTension) {
+  const Body body = odd_cells(false);
+  const double mu = kYoung / (2.0 * (1.0 + kPoisson)), bulk = kYoung / (3.0 * (1.0 - 2.0 * kPoisson));
+  const auto pull_of = [&](const CellEnergy& cells, double stretch) {
+    double low = 0.7, high = 1.3;  // the sides push outwards at the first and pull at the second
+    for (int k = 0; k < 60; ++k) {
+      const double width = 0.5 * (low + high);
+      (nominal_stress(cells, body, {stretch, width, width})(1, 1) < 0.0 ? low : high) = width;
+    }
+    return nominal_stress(cells, body, {stretch, low, low})(0, 0);
+  };
+  for (double stretch : {0.8, 0.95, 1.05, 1.3, 1.5}) {
+    const double strain = 0.5 * (stretch * stretch - 1.0);
+    EXPECT_NEAR(pull_of(*stvk_cells(body), stretch), kYoung * stretch * strain, 1e-9 * kYoung) << stretch;
+    const double j = 1.0 + mu * (1.0 - 1.0 / stretch) / (bulk + mu / 3.0);
+    EXPECT_NEAR(pull_of(*neo_hookean_cells(body), stretch), mu * (stretch - j / (stretch * stretch)),
+                1e-9 * kYoung)
+        << stretch;
+  }
+}
+
 TEST(NeoHookean, HasAFiniteForceInAnyShape) {
   std::mt19937_64 rng(20036);
   const Body body = odd_cells();
