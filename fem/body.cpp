@@ -144,13 +144,47 @@ void BodyOptions::validate() const {
   require(levels >= 0 && levels <= 3, "levels", levels, "0 to 3");
   validate_material(material);
   for (const JointMaterial& m : materials) validate_material(m.material);
+  for (const RegionMaterial& m : region_materials) validate_material(m.applied_to(material));
+  for (const JointTie& tie : ties.joints) {
+    require(tie.radius.value_or(1.0) > 0.0, "twist radius", *tie.radius, "> 0");
+    require(tie.stiffness.value_or(1.0) >= 0.0, "twist stiffness", *tie.stiffness, ">= 0");
+  }
   require(damping.ratio >= 0.0, "damping", damping.ratio, ">= 0");
   require(damping.frequency > 0.0, "damping_frequency", damping.frequency, "a positive number of hertz");
   require(ties.stiffness >= 0.0, "twist stiffness", ties.stiffness, ">= 0");
   require(ties.radius > 0.0, "twist radius", ties.radius, "> 0");
 }
 
-Body make_body(const BodyInput& input, const BodyOptions& options) {
+Material RegionMaterial::applied_to(Material material) const {
+  material.young = young.value_or(material.young);
+  material.poisson = poisson.value_or(material.poisson);
+  material.density = density.value_or(material.density);
+  return material;
+}
+
+namespace {
+
+/// Materials per leaf cell: the dominant frame's, then those of the user's regions.
+std::vector<Material> leaf_materials(const BodyInput& input, const BodyOptions& options,
+                                     const lattice::Hierarchy& hierarchy, const lattice::LeafMesh& mesh,
+                                     const FrameWeights& weights, const std::vector<Material>& of_frame) {
+  std::vector<Material> materials;
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    Material material = of_frame[static_cast<std::size_t>(dominant_frame(weights, mesh.cells[c]))];
+    if (!input.lattice.regions.empty()) {
+      const int coarse = lattice::coarse_cell(hierarchy, mesh, static_cast<int>(c));
+      for (const RegionMaterial& own : options.region_materials)
+        if (own.region == input.lattice.regions[static_cast<std::size_t>(coarse)])
+          material = own.applied_to(material);
+    }
+    materials.push_back(material);
+  }
+  return materials;
+}
+
+enum class Assembly { Left, Done };
+
+Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly) {
   options.validate();
   check_input(input);
   const double h = input.lattice.edge_length;
@@ -209,15 +243,15 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
   if (mirror) symmetrise(*mirror, weights);
 
   const std::vector<Material> of_frame = frame_materials(tree, options);
-  std::vector<Material> materials;
-  for (const auto& cell : mesh.cells)
-    materials.push_back(of_frame[static_cast<std::size_t>(dominant_frame(weights, cell))]);
-  LeafMatrices matrices = assemble(mesh, materials, kept_fill);
+  std::vector<Material> materials = leaf_materials(input, options, hierarchy, mesh, weights, of_frame);
+  LeafMatrices matrices;
+  if (assembly == Assembly::Done) matrices = assemble(mesh, materials, kept_fill);
   std::vector<double> mu_of_frame;
   for (const Material& m : of_frame) mu_of_frame.push_back(m.mu());
   const LimbRadii radii(input.lattice, tree, input.skin, h, map ? &*map : nullptr);
-  std::vector<Tie> ties =
-      add_ties(input.lattice, tree, radii, mesh, kept_limbs, mu_of_frame, h, options.ties, matrices);
+  std::vector<Tie> ties;
+  if (assembly == Assembly::Done)
+    ties = add_ties(input.lattice, tree, radii, mesh, kept_limbs, mu_of_frame, h, options.ties, matrices);
 
   std::vector<PosedFrames> posed;
   for (const auto& pose : input.poses) posed.push_back(pose_frames(tree, pose, 0.0));
@@ -243,6 +277,8 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
             {},
             0.0,
             0.0};
+  body.size = (body.mesh.points.colwise().maxCoeff() - body.mesh.points.colwise().minCoeff()).norm();
+  if (assembly == Assembly::Left) return body;
   if (body.grows) body.bone_extension = bone_extension(body.hierarchy, body.mesh, body.skin, body.bones);
   body.vertex_mass.assign(static_cast<std::size_t>(body.mesh.num_vertices()), 0.0);
   for (int a = 0; a < body.mesh.num_vertices(); ++a) {
@@ -255,8 +291,17 @@ Body make_body(const BodyInput& input, const BodyOptions& options) {
     for (double w : gauss_weights(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]), body.fill[c]))
       body.volume += w;
   }
-  body.size = (body.mesh.points.colwise().maxCoeff() - body.mesh.points.colwise().minCoeff()).norm();
   return body;
+}
+
+}  // namespace
+
+Body make_body(const BodyInput& input, const BodyOptions& options) {
+  return make(input, options, Assembly::Done);
+}
+
+Body paint_body(const BodyInput& input, const BodyOptions& options) {
+  return make(input, options, Assembly::Left);
 }
 
 }  // namespace sinew::fem

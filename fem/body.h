@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,12 +19,21 @@ struct JointMaterial {
   Material material;
 };
 
+/// Flesh of the cells that the user's lattice puts in one region: what is given overrides the frame's.
+struct RegionMaterial {
+  int region = 0;                                                ///< as in ControlLattice::regions.
+  std::optional<double> young = {}, poisson = {}, density = {};  ///< as in Material.
+
+  Material applied_to(Material material) const;
+};
+
 struct BodyOptions {
   /// Finest level with active functions; 0 .. 3. Level 1 is the least that bends well: level-0 tetrahedra
   /// alone are 48 % too stiff at nu = 0.3.
   int levels = 1;
-  Material material;                     ///< where nothing else is said.
-  std::vector<JointMaterial> materials;  ///< overrides.
+  Material material;                                  ///< where nothing else is said.
+  std::vector<JointMaterial> materials;               ///< overrides.
+  std::vector<RegionMaterial> region_materials = {};  ///< win over both; later ones over earlier ones.
   Damping damping;
   TieOptions ties;
   RegionOptions regions;
@@ -81,5 +91,9 @@ struct BodyInput {
 /// Throws std::invalid_argument where a cell is inverted, no cell holds flesh, the skin has no weights or
 /// names a joint that is not there, or an option is out of range.
 Body make_body(const BodyInput& input, const BodyOptions& options = {});
+
+/// The same without what it takes to move: no matrices, no ties, no masses. For looking at fill, materials
+/// and regions; takes a fraction of the memory.
+Body paint_body(const BodyInput& input, const BodyOptions& options = {});
 
 }  // namespace sinew::fem

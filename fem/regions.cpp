@@ -25,12 +25,21 @@ FrameBends judge_bends(const FrameTree& tree, const std::vector<PosedFrames>& po
     }
     return largest;
   };
+  std::vector<int> group(static_cast<std::size_t>(tree.num_frames()), -1);
+  for (std::size_t g = 0; g < options.groups.size(); ++g) {
+    for (const int joint : options.groups[g]) {
+      const int f = tree.frame_of_joint[static_cast<std::size_t>(joint)];
+      if (f >= 0) group[static_cast<std::size_t>(f)] = static_cast<int>(g);
+    }
+  }
   FrameBends bends;
   for (int f = 0; f < tree.num_frames(); ++f) {
     const int parent = tree.frames[static_cast<std::size_t>(f)].parent;
     const int above = parent < 0 ? f : bends.leader[static_cast<std::size_t>(parent)];
     const double angle = parent < 0 ? 0.0 : largest_angle(above, f);
-    const bool merges = parent >= 0 && angle <= options.merge_angle + kAngleRounding;
+    const int own = group[static_cast<std::size_t>(f)];
+    const bool merges = parent >= 0 && own == group[static_cast<std::size_t>(above)] &&
+                        (own >= 0 || angle <= options.merge_angle + kAngleRounding);
     bends.leader.push_back(merges ? above : f);
     bends.bend.push_back(merges ? 0.0 : angle);
   }

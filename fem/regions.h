@@ -40,6 +40,9 @@ struct RegionOptions {
   /// Two regions that never bend more than this against each other need no joint region [rad]: the same angle
   /// lies between neighbouring frames of a 60-degree bend that has one.
   double joint_angle = 30.0 * std::numbers::pi / 180.0;
+  /// Joints of the skeleton whose frames share one region, however they turn, and share it with no other:
+  /// each but the first hangs on another one of its group. A group of one has a region of its own.
+  std::vector<std::vector<int>> groups = {};
 };
 
 /// How frames turn against each other over a run: judged once, so that weights never jump.

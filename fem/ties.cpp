@@ -140,6 +140,22 @@ std::vector<std::uint8_t> cells_at_segment(const lattice::LeafMesh& mesh, const 
   return holds;
 }
 
+/// The radius below which a tube could slip between the samples of a level-1 cell. Pieces of a chain are at
+/// most 1.65 edges long on the mean where all cells are of one size.
+double smallest_radius(const lattice::LatticeBone& bone, double edge_length) {
+  constexpr double kLongestPiece = 1.65;
+  const double pieces = static_cast<double>(std::max<std::size_t>(2, bone.chain.size()) - 1);
+  const double piece = bone.chain.empty() ? 0.0 : (bone.rest_end - bone.rest_start).norm() / pieces;
+  return 0.25 * std::max(edge_length, piece / kLongestPiece);
+}
+
+JointTie override_of(const TieOptions& options, int joint) {
+  JointTie found;
+  for (const JointTie& tie : options.joints)
+    if (tie.joint == joint) found = tie;
+  return found;
+}
+
 }  // namespace
 
 std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
@@ -151,9 +167,11 @@ std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTre
   for (int b = 0; b < static_cast<int>(lattice.bones.size()); ++b) {
     const auto& bone = lattice.bones[static_cast<std::size_t>(b)];
     const int frame = tree.frame_of_joint[static_cast<std::size_t>(bone.frame)];
-    const double c = bone.soft ? options.soft_stiffness : options.stiffness;
+    const JointTie own = override_of(options, bone.frame);
+    const double c = own.stiffness.value_or(bone.soft ? options.soft_stiffness : options.stiffness);
     if (c == 0.0) continue;
-    const double radius = std::max(options.radius * radii.of_bone(b), smallest);
+    const double radius =
+        own.radius.value_or(std::max(options.radius * radii.of_bone(b), smallest_radius(bone, edge_length)));
     const double kappa = c * mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
     const std::vector<std::uint8_t> holds_bone =
         bone.chain.empty()
@@ -165,9 +183,10 @@ std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTre
   }
   for (const auto& soft : lattice.soft_frames) {
     const int frame = tree.frame_of_joint[static_cast<std::size_t>(soft.frame)];
-    const double radius = 0.5 * edge_length;
-    const double kappa =
-        options.soft_stiffness * mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
+    const JointTie own = override_of(options, soft.frame);
+    const double radius = own.radius.value_or(0.5 * edge_length);
+    const double kappa = own.stiffness.value_or(options.soft_stiffness) *
+                         mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
     ties.push_back(add_tie({soft.position, soft.position, radius}, frame, soft.frame, kappa, mesh, limbs,
                            cells_at_segment(mesh, limbs, soft.frame, soft.position, soft.position, smallest),
                            matrices));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "fem/frames.h"
@@ -11,11 +12,19 @@
 /// ([Capell02, sec. 5.3] for the need; the tube is ours).
 namespace sinew::fem {
 
+/// What the ties of one joint's bones and soft frame differ in.
+struct JointTie {
+  int joint = -1;                        ///< joint of the skeleton.
+  std::optional<double> radius = {};     ///< r [m]; > 0.
+  std::optional<double> stiffness = {};  ///< c [-]; >= 0, > 0 where the bone is soft.
+};
+
 /// sum over bones of kappa/2 int_{tube} |p - T_b r(x)|^2 dV, with kappa = c mu / r^2.
 struct TieOptions {
   double stiffness = 10.0;        ///< c of hard bones [-]; >= 0.
   double soft_stiffness = 100.0;  ///< c of soft bones and soft frames [-]; > 0.
   double radius = 0.25;  ///< r as a share of the local limb radius [-]; > 0. How thick the bone feels.
+  std::vector<JointTie> joints = {};  ///< overrides; of several for one joint the last counts.
 };
 
 /// One tie: what its target T_b X contributes to the force, per leaf vertex it touches.
@@ -30,7 +39,8 @@ struct Tie {
 };
 
 /// Adds the ties' matrices to matrices.tie (P = sum_b P_b) and returns their targets. The tube's radius does
-/// not depend on the active level: at least a quarter of `edge_length` (half a level-1 cell). Of cells that
+/// not depend on the active level: at least a quarter of `edge_length` (half a level-1 cell), or of what the
+/// bone's pieces say where cells are larger there; unless an override says it. Of cells that
 /// coincide only the one of the tie's own limb (`limbs`) is held.
 std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
                           const LimbRadii& radii, const lattice::LeafMesh& mesh,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -13,8 +14,10 @@
 #include "assets/lattice_files.h"
 #include "fem/default_material.h"
 #include "tools/failure.h"
+#include "tools/lattice_memory.h"
 #include "tools/plain_character.h"
 #include "tools/plain_loads.h"
+#include "tools/suggest.h"
 
 namespace sinew::tools {
 namespace {
@@ -53,6 +56,10 @@ void report_lattice(const Scene& scene, const lattice::BuildResult& result, cons
 constexpr double kPoseSpacing = 1.0 / 30.0;
 std::vector<std::vector<Eigen::Affine3d>> sample_poses(const Character& c) {
   std::vector<std::vector<Eigen::Affine3d>> poses;
+  if (c.clip < 0) {
+    poses.emplace_back(static_cast<std::size_t>(c.rig.skeleton.num_joints()), Eigen::Affine3d::Identity());
+    return poses;
+  }
   const double duration = std::min(c.the_clip().duration(), 3600.0);  // an hour shows what a clip does
   for (int k = 0; k * kPoseSpacing < duration; ++k)
     poses.push_back(c.pose(c.the_clip().start + k * kPoseSpacing));
@@ -69,10 +76,119 @@ fem::DefaultMaterials default_materials(const Scene& scene, const Character& c) 
                                  scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth});
 }
 
+/// The material of a joint's flesh so far.
+fem::Material material_of(const fem::BodyOptions& body, int joint) {
+  fem::Material material = body.material;
+  for (const fem::JointMaterial& of_joint : body.materials)
+    if (of_joint.joint == joint) material = of_joint.material;  // the last one counts
+  return material;
+}
+
+/// A pull must reach some flesh, and soft bones are held by nothing else.
+void check_pull(const Character& c, const lattice::LatticeBone& bone, const BoneMaterial& material,
+                const std::string& where) {
+  const double least = 0.25 * c.lattice.lattice.edge_length;
+  if (material.radius && *material.radius < least) {
+    throw assets::ConfigError(
+        fmt::format("{}: radius: got {}, expected at least {:.3g} m, a quarter of the lattice's edge, at "
+                    "bone '{}'; hint: "
+                    "more cells",
+                    where, *material.radius, least, bone.name));
+  }
+  if (bone.soft && material.stiffness && !(*material.stiffness > 0.0)) {
+    throw assets::ConfigError(fmt::format(
+        "{}: stiffness: got 0, expected more as bone '{}' is soft and held by it alone", where, bone.name));
+  }
+}
+
+/// The joints of one named region: every bone but the topmost hangs on another one of it.
+void add_group(const Character& c, const std::vector<int>& bones, const std::string& where,
+               std::vector<std::vector<int>>& groups) {
+  const lattice::ControlLattice& lattice = c.lattice.lattice;
+  const fem::FrameTree tree = fem::frame_tree(lattice, c.rig.skeleton);
+  std::set<int> frames;
+  for (const int b : bones)
+    frames.insert(
+        tree.frame_of_joint[static_cast<std::size_t>(lattice.bones[static_cast<std::size_t>(b)].frame)]);
+  std::vector<int> joints;
+  for (const int f : frames) {
+    const fem::Frame& frame = tree.frames[static_cast<std::size_t>(f)];
+    joints.push_back(frame.joint);
+    if (f != *frames.begin() && !frames.contains(frame.parent)) {
+      throw assets::ConfigError(fmt::format(
+          "{}: region: bone '{}' hangs on none of the others, expected bones that hang together; hint: "
+          "regions of their own",
+          where, frame.name));
+    }
+  }
+  for (std::vector<int>& group : groups)
+    std::erase_if(group,
+                  [&](int joint) { return std::find(joints.begin(), joints.end(), joint) != joints.end(); });
+  groups.push_back(joints);
+}
+
+/// What the scene says of single bones, one material after the other.
+void paint_bones(const Scene& scene, Character& c) {
+  fem::BodyOptions& body = c.body_options;
+  const lattice::ControlLattice& lattice = c.lattice.lattice;
+  std::vector<std::string> names;
+  for (const auto& bone : lattice.bones) names.push_back(bone.name);
+  const std::vector<std::vector<int>> bones = bones_of_materials(scene, c.rig.file, names);
+  std::map<std::string, std::vector<int>> of_region;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    const BoneMaterial& m = scene.materials[i];
+    const std::string where = fmt::format("material {}", i + 1);
+    for (const int b : bones[i]) {
+      const lattice::LatticeBone& bone = lattice.bones[static_cast<std::size_t>(b)];
+      check_pull(c, bone, m, where);
+      const fem::RegionMaterial own{0, m.young, m.poisson, m.density};
+      body.materials.push_back({bone.frame, own.applied_to(material_of(body, bone.frame))});
+      if (!m.radius && !m.stiffness) continue;
+      fem::JointTie tie;
+      for (const fem::JointTie& earlier : body.ties.joints)
+        if (earlier.joint == bone.frame) tie = earlier;
+      tie.joint = bone.frame;
+      if (m.radius) tie.radius = m.radius;
+      if (m.stiffness) tie.stiffness = m.stiffness;
+      body.ties.joints.push_back(tie);
+    }
+    if (m.region.empty()) continue;
+    // Bones that several materials put into one region belong together.
+    std::vector<int>& all = of_region[m.region];
+    all.insert(all.end(), bones[i].begin(), bones[i].end());
+    add_group(c, all, where, body.regions.groups);
+  }
+}
+
+/// What the scene says of regions of the user's lattice.
+void paint_regions(const Scene& scene, Character& c) {
+  const lattice::ControlLattice& lattice = c.lattice.lattice;
+  std::map<std::string, int> numbers;
+  for (const int region : lattice.regions) numbers[std::to_string(region)] = region;
+  for (const lattice::RegionName& region : lattice.region_names) numbers[region.name] = region.number;
+  std::vector<std::string> names;
+  for (const auto& [name, number] : numbers) names.push_back(name);
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    const BoneMaterial& m = scene.materials[i];
+    for (const std::string& region : m.regions) {
+      const auto found = numbers.find(region);
+      if (found == numbers.end()) {
+        const std::string guess = nearest(region, names);
+        throw assets::InputError(
+            scene.lattice,
+            fmt::format("material {}: no region is named '{}', expected one of {}{}", i + 1, region,
+                        names.empty() ? "none, as the file has no regions"
+                                      : fmt::format("{}", fmt::join(names, ", ")),
+                        guess.empty() ? "" : fmt::format("; hint: did you mean {}?", guess)));
+      }
+      c.body_options.region_materials.push_back({found->second, m.young, m.poisson, m.density});
+    }
+  }
+}
+
 /// The scene's materials: E by the scene or by default, then what the scene says of single bones.
 void settle_materials(const Scene& scene, Character& c) {
   fem::BodyOptions& body = c.body_options;
-  const lattice::ControlLattice& lattice = c.lattice.lattice;
   if (!scene.plain) {
     const fem::DefaultMaterials defaults = default_materials(scene, c);
     c.limb_thickness = defaults.thickness;
@@ -83,22 +199,8 @@ void settle_materials(const Scene& scene, Character& c) {
     body.material.young = *scene.young;
     body.materials.clear();
   }
-  std::vector<std::string> names;
-  for (const auto& bone : lattice.bones) names.push_back(bone.name);
-  const std::vector<int> chosen = material_of_bone(scene, c.rig.file, names);
-  for (std::size_t b = 0; b < lattice.bones.size(); ++b) {
-    if (chosen[b] < 0) continue;
-    const int joint = lattice.bones[b].frame;
-    fem::Material material = body.material;
-    for (const auto& of_joint : body.materials) {
-      if (of_joint.joint == joint) material = of_joint.material;  // the last one counts
-    }
-    const BoneMaterial& m = scene.materials[static_cast<std::size_t>(chosen[b])];
-    if (m.young) material.young = *m.young;
-    if (m.poisson) material.poisson = *m.poisson;
-    if (m.density) material.density = *m.density;
-    body.materials.push_back({joint, material});
-  }
+  paint_bones(scene, c);
+  paint_regions(scene, c);
 }
 
 }  // namespace
@@ -152,6 +254,7 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
     const Phase phase(c.times, "lattice");
     const lattice::BuildOptions options = build_options(scene, c.input.joints.names);
     if (scene.lattice.empty()) {
+      check_lattice_memory(scene, c.input.skin.surface);
       const std::string folder =
           scene.cache == Switch::Off || scene.output.empty() ? "" : assets::cache_folder(scene.output);
       assets::CachedBuild built =
@@ -201,24 +304,49 @@ Character make_character(const Scene& scene, const Talk& talk) {
   } else {
     load_rig(scene, talk, c);
   }
+  settle_flesh(scene, c);
+  return c;
+}
+
+void settle_flesh(const Scene& scene, Character& c) {
   fem::BodyOptions& body = c.body_options;
   body.levels = scene.levels;
   body.material.poisson = scene.poisson;
   body.material.density = scene.density;
   body.damping = {scene.damping, scene.damping_frequency};
   settle_materials(scene, c);
-  return c;
 }
 
-fem::Body make_body(const Character& character) {
+namespace {
+
+template <class Make>
+fem::Body body_by(const Make& make, const Character& character, const fem::BodyOptions& options) {
   const std::vector<std::vector<Eigen::Affine3d>> poses = sample_poses(character);
   try {
-    return fem::make_body({character.lattice.lattice, character.input.skin.surface, character.rig.skeleton,
-                           poses, character.held, character.bare_frames},
-                          character.body_options);
+    return make({character.lattice.lattice, character.input.skin.surface, character.rig.skeleton, poses,
+                 character.held, character.bare_frames},
+                options);
   } catch (const std::invalid_argument& error) {
     throw assets::InputError(character.rig.file, error.what());
   }
+}
+
+}  // namespace
+
+fem::Body make_body(const Character& character) {
+  return body_by(fem::make_body, character, character.body_options);
+}
+
+fem::Body paint_body(const Character& character) {
+  fem::BodyOptions options = character.body_options;
+  if (character.clip < 0) {
+    // Nobody knows how the frames turn: each that the scene does not group has a region of its own.
+    std::set<int> grouped;
+    for (const std::vector<int>& group : options.regions.groups) grouped.insert(group.begin(), group.end());
+    for (const fem::Frame& frame : fem::frame_tree(character.lattice.lattice, character.rig.skeleton).frames)
+      if (!grouped.contains(frame.joint)) options.regions.groups.push_back({frame.joint});
+  }
+  return body_by(fem::paint_body, character, options);
 }
 
 fem::SimulationOptions simulation_options(const Scene& scene) {

@@ -20,7 +20,7 @@ using PhaseTimes = std::vector<std::pair<std::string, double>>;
 /// Everything a run needs, in the rig's space (SI, Y up).
 struct Character {
   assets::Rig rig;
-  int clip = -1;                     ///< index into rig.clips.
+  int clip = -1;                     ///< index into rig.clips; -1: none, the rest pose alone.
   assets::LatticeInput input;        ///< welded skin and joints.
   lattice::BuildResult lattice;      ///< built, or read from the scene's lattice file.
   std::string new_lattice_key;       ///< where it was built: its name in the cache, to be kept there.
@@ -42,6 +42,10 @@ using Talk = std::function<void(const std::string&)>;
 /// of assets/error.h, and NumericalError where the lattice has a failure that a simulation cannot bear.
 Character make_character(const Scene& scene, const Talk& talk);
 
+/// The last part of it: damping, materials, pulls and regions for a rig, a clip and a lattice that are there.
+/// Throws assets::ConfigError and assets::InputError for a bone or region that is not there.
+void settle_flesh(const Scene& scene, Character& character);
+
 /// How a lattice of the user's is read.
 assets::ReadLatticeOptions read_options(const Scene& scene, const assets::Rig& rig);
 
@@ -51,6 +55,9 @@ lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::s
 
 /// The flesh of the character. Throws assets::InputError naming the rig where the lattice cannot carry it.
 fem::Body make_body(const Character& character);
+
+/// The same to look at: materials and regions without matrices. Without a clip every frame has a region.
+fem::Body paint_body(const Character& character);
 
 /// fem's options for a scene.
 fem::SimulationOptions simulation_options(const Scene& scene);

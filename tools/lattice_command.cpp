@@ -8,9 +8,6 @@
 #include <iostream>
 #include <set>
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -21,10 +18,12 @@
 #include "assets/lattice_input.h"
 #include "assets/lattice_picture.h"
 #include "assets/rig.h"
+#include "tools/body_fields.h"
 #include "tools/character.h"
 #include "tools/command.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
+#include "tools/lattice_memory.h"
 #include "tools/scene_flags.h"
 
 namespace sinew::tools {
@@ -61,29 +60,6 @@ void check_request(const LatticeRequest& request) {
     if (!scene.overwrite && std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
       throw assets::BusyError(file + ": is there already; hint: give --overwrite or another name");
   }
-}
-
-/// Memory that this process may use [bytes]: the machine's, or less where a limit is set.
-double available_bytes() {
-  double bytes = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
-  rlimit limit{};
-  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
-    bytes = std::min(bytes, static_cast<double>(limit.rlim_cur));
-  return bytes;
-}
-
-/// States what a large lattice will take, and refuses what there is no room for.
-void check_memory(int cells) {
-  constexpr int kWorthSaying = 10'000;
-  const auto estimate = static_cast<double>(lattice::estimated_build_bytes(cells));
-  const double available = available_bytes();
-  if (estimate > available)
-    throw assets::LimitError(
-        fmt::format("--cells: got {}, which takes about {:.2g} GB of memory, the limit is {:.2g} GB; hint: "
-                    "1000 cells suffice for most characters",
-                    cells, 1e-9 * estimate, 1e-9 * available));
-  if (cells >= kWorthSaying)
-    fmt::print(stderr, "about {:.2g} GB of memory for {} cells\n", 1e-9 * estimate, cells);
 }
 
 /// One line for the failures of the gate, the worst first.
@@ -225,25 +201,54 @@ assets::CachedBuild make_lattice(const Scene& scene, const assets::Rig& rig,
   return built;
 }
 
+/// The rig's clip where it has one that moves: how its joints turn decides on the regions.
+int clip_of(const Scene& scene, const assets::Rig& rig) {
+  try {
+    return assets::choose_clip(rig, scene.clip);
+  } catch (const assets::InputError&) {
+    return -1;
+  }
+}
+
+/// What a simulation would make of the lattice, to look at: fill, materials and weights of the regions.
+assets::LatticeFields fields_to_see(const Scene& scene, Character& character) {
+  const lattice::ControlLattice& lattice = character.lattice.lattice;
+  settle_flesh(scene, character);
+  if (lattice.complex.cells.size() > kMostPaintedCells) {
+    fmt::print(stderr, "  the file holds no materials and regions, as there are more than {} cells\n",
+               kMostPaintedCells);
+    return assets::skin_fields(lattice, character.input.skin.surface);
+  }
+  try {
+    assets::LatticeFields fields = body_fields(paint_body(character));
+    const std::vector<std::int64_t> undivided(lattice.complex.cells.size(), 0);
+    for (assets::VtuArray& field : fields.cells)
+      if (field.name == "level") field.values = undivided;
+    return fields;
+  } catch (const assets::InputError& error) {
+    fmt::print(stderr, "warning: no materials and regions in the file: {}\n", single_line(error.what()));
+    return assets::skin_fields(lattice, character.input.skin.surface);
+  }
+}
+
 /// The picture first: the lattice under its name means that all is done.
-void write_outputs(const LatticeRequest& request, const lattice::ControlLattice& lattice,
-                   const assets::LatticeInput& input) {
+void write_outputs(const LatticeRequest& request, Character& character) {
   const Scene& scene = request.scene;
+  const lattice::ControlLattice& lattice = character.lattice.lattice;
   const bool has_picture = scene.preview == Switch::On;
   const assets::Overwrite overwrite =
       scene.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse;
   const bool has_fields = std::filesystem::path(scene.output).extension().string().starts_with(".vt");
-  const assets::LatticeFields fields =
-      has_fields ? assets::skin_fields(lattice, input.skin.surface) : assets::LatticeFields{};
+  const assets::LatticeFields fields = has_fields ? fields_to_see(scene, character) : assets::LatticeFields{};
   if (has_picture) {
     assets::LatticePictureOptions picture;
     picture.caption = fmt::format("{}: lattice of {} cells", std::filesystem::path(scene.rig).stem().string(),
                                   lattice.complex.cells.size());
-    const assets::Image image = assets::render_lattice(lattice, input.skin.surface, picture);
+    const assets::Image image = assets::render_lattice(lattice, character.input.skin.surface, picture);
     assets::write_file(picture_name(request), assets::png_bytes(image), overwrite);
   }
   try {
-    assets::write_lattice(scene.output, lattice, input.joints, overwrite, fields, request.format);
+    assets::write_lattice(scene.output, lattice, character.input.joints, overwrite, fields, request.format);
   } catch (...) {
     std::error_code ignored;
     if (has_picture) std::filesystem::remove(picture_name(request), ignored);
@@ -259,19 +264,22 @@ void run_lattice(const LatticeRequest& request) {
   const auto start = std::chrono::steady_clock::now();
   assets::LoadOptions load;
   load.height = scene.height.value_or(0.0);
-  const assets::Rig rig = assets::load_rig(scene.rig, load);
-  const assets::LatticeInput input = assets::lattice_input(rig);
-  if (scene.lattice.empty() && !scene.cell_size) check_memory(scene.cells);
+  Character character;
+  character.rig = assets::load_rig(scene.rig, load);
+  character.clip = clip_of(scene, character.rig);
+  character.input = assets::lattice_input(character.rig);
+  const lattice::JointTree& joints = character.input.joints;
+  if (scene.lattice.empty()) check_lattice_memory(scene, character.input.skin.surface);
   stop_if_interrupted("before building the lattice");
-  const assets::CachedBuild built = make_lattice(scene, rig, input);
-  const lattice::ControlLattice& lattice = built.result.lattice;
+  assets::CachedBuild built = make_lattice(scene, character.rig, character.input);
+  character.lattice = std::move(built.result);
   stop_if_interrupted("before writing the lattice");
-  write_outputs(request, lattice, input);
+  write_outputs(request, character);
   if (built.use == assets::CacheUse::Built)
-    assets::keep_lattice(assets::cache_folder(scene.output), built.key, built.result, input.joints);
-  if (scene.json) std::cout << lattice_report(built.result, input.joints);
+    assets::keep_lattice(assets::cache_folder(scene.output), built.key, character.lattice, joints);
+  if (scene.json) std::cout << lattice_report(character.lattice, joints);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  print_summary(scene.output, built.result, elapsed.count());
+  print_summary(scene.output, character.lattice, elapsed.count());
 }
 
 void add_lattice_command(CLI::App& app, CommandContext&) {

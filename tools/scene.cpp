@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -36,7 +37,11 @@ bool matches(std::string_view pattern, std::string_view name) {
 }
 
 std::string print_material(const BoneMaterial& material) {
-  std::string text = "\n[[material]]\nbones = " + toml_quoted(material.bones, "bones") + "\n";
+  std::string text = "\n[[material]]\n";
+  if (!material.bones.empty()) text += fmt::format("bones = {}\n", toml_quoted(material.bones, "bones"));
+  if (!material.regions.empty())
+    text += fmt::format("regions = {}\n", toml_quoted(material.regions, "regions"));
+  if (!material.region.empty()) text += fmt::format("region = {}\n", toml_quoted(material.region, "region"));
   for (const auto& [field, member] : material_values()) {
     if (material.*member) text += fmt::format("{} = {}\n", field->key, *(material.*member));
   }
@@ -100,8 +105,31 @@ void check_no_builder_keys(const Scene& scene) {
 std::vector<MaterialValue> material_values() {
   return {{find_scene_field("young"), &BoneMaterial::young},
           {find_scene_field("poisson"), &BoneMaterial::poisson},
-          {find_scene_field("density"), &BoneMaterial::density}};
+          {find_scene_field("density"), &BoneMaterial::density},
+          {&pull_radius_field(), &BoneMaterial::radius},
+          {&pull_stiffness_field(), &BoneMaterial::stiffness}};
 }
+
+namespace {
+
+void check_material(const Scene& scene, const BoneMaterial& material, const std::string& where) {
+  if (material.bones.empty() && material.regions.empty())
+    throw assets::ConfigError(where + ": no bones, expected at least one name");
+  for (const auto& [field, member] : material_values()) {
+    if (material.*member) check_number(*field, *(material.*member), fmt::format("{}: {}", where, field->key));
+  }
+  if (material.regions.empty()) return;
+  if (!material.bones.empty() || material.radius || material.stiffness || !material.region.empty())
+    throw assets::ConfigError(where +
+                              ": regions of a lattice, expected no bones, radius, stiffness or region with "
+                              "them; hint: two materials");
+  if (scene.lattice.empty())
+    throw assets::ConfigError(where +
+                              ": regions, expected none as a lattice that is built has none; hint: bones, or "
+                              "a lattice of your own");
+}
+
+}  // namespace
 
 void Scene::validate() const {
   for (const SceneField& field : scene_fields()) check_field(*this, field, std::string(field.key));
@@ -113,13 +141,7 @@ void Scene::validate() const {
     check_number(size_factor_field(), sizes[i].factor, where + ": factor");
   }
   for (std::size_t i = 0; i < materials.size(); ++i) {
-    const std::string where = fmt::format("material {}", i + 1);
-    if (materials[i].bones.empty())
-      throw assets::ConfigError(where + ": no bones, expected at least one name");
-    for (const auto& [field, member] : material_values()) {
-      if (materials[i].*member)
-        check_number(*field, *(materials[i].*member), fmt::format("{}: {}", where, field->key));
-    }
+    check_material(*this, materials[i], fmt::format("material {}", i + 1));
   }
 }
 
@@ -185,19 +207,21 @@ std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::
   return joints;
 }
 
-std::vector<int> material_of_bone(const Scene& scene, const std::string& rig_file,
-                                  const std::vector<std::string>& bone_names) {
-  std::vector<int> material(bone_names.size(), -1);
+std::vector<std::vector<int>> bones_of_materials(const Scene& scene, const std::string& rig_file,
+                                                 const std::vector<std::string>& bone_names) {
+  std::vector<std::vector<int>> bones;
   for (std::size_t m = 0; m < scene.materials.size(); ++m) {
+    std::set<int> chosen;
     for (const std::string& pattern : scene.materials[m].bones) {
       const std::vector<int> found = matching(pattern, bone_names);
-      for (const int bone : found) material[static_cast<std::size_t>(bone)] = static_cast<int>(m);
+      chosen.insert(found.begin(), found.end());
       if (found.empty())
         throw assets::InputError(rig_file,
                                  fmt::format("material {}: {}", m + 1, no_such_bone(pattern, bone_names)));
     }
+    bones.emplace_back(chosen.begin(), chosen.end());
   }
-  return material;
+  return bones;
 }
 
 }  // namespace sinew::tools

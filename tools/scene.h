@@ -32,11 +32,21 @@ struct FrameRange {
 
 /// Flesh that differs from the scene's: `[[material]]` in a scene file. Fields left out are the scene's.
 struct BoneMaterial {
-  /// Names of bones, with * for any letters and ? for one; at least one.
+  /// Names of bones, with * for any letters and ? for one; at least one, unless there are `regions`.
   std::vector<std::string> bones;
   std::optional<double> young;    ///< as Scene::young.
   std::optional<double> poisson;  ///< as Scene::poisson.
   std::optional<double> density;  ///< as Scene::density.
+  /// How far from the bone flesh is pulled after its rotation [m]; 1e-6 ... 1e3.
+  std::optional<double> radius = {};
+  /// Of that pull [-], c in c mu / radius^2; 0 ... 1e6. 10 for bones on edges, 100 for soft ones.
+  std::optional<double> stiffness = {};
+  /// These bones, each hanging on another of them, are one region of this name; nothing: judged by how they
+  /// turn.
+  std::string region = {};
+  /// Instead of bones: names or numbers of regions of the lattice that is read. They take no radius,
+  /// stiffness and region.
+  std::vector<std::string> regions = {};
 
   friend bool operator==(const BoneMaterial&, const BoneMaterial&) = default;
 };
@@ -176,9 +186,9 @@ std::string no_such_bone(const std::string& pattern, const std::vector<std::stri
 std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::vector<std::string>& names,
                            const std::string& where);
 
-/// For every bone the index of its material in scene.materials, or -1 for the scene's own. Throws
-/// assets::InputError (for `rig_file`) where a pattern fits no bone.
-std::vector<int> material_of_bone(const Scene& scene, const std::string& rig_file,
-                                  const std::vector<std::string>& bone_names);
+/// For every material the bones that it is for; none for one of regions. Throws assets::InputError (for
+/// `rig_file`) where a pattern fits no bone.
+std::vector<std::vector<int>> bones_of_materials(const Scene& scene, const std::string& rig_file,
+                                                 const std::vector<std::string>& bone_names);
 
 }  // namespace sinew::tools

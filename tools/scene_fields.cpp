@@ -119,6 +119,17 @@ constexpr SceneField kSizeFactor{
     "factor", SceneMember{}, "length of the cells' edges there over that elsewhere", "factor", {0.25, 4.0},
     "",       "0.5"};
 
+constexpr SceneField kPullRadius{
+    "radius",    SceneMember{}, "how far from its bone flesh is pulled after its turns", "r",
+    {1e-6, 1e3}, "m",           "leave it out for a quarter of the limb's radius"};
+constexpr SceneField kPullStiffness{"stiffness",
+                                    SceneMember{},
+                                    "of that pull, in shear moduli",
+                                    "c",
+                                    {0.0, 1e6},
+                                    "",
+                                    "10, or 100 for soft bones"};
+
 const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
 const std::vector<std::string> kPrecisionNames{"double", "float"};          // in the enum's order
 const std::vector<std::string> kOutputSpaceNames{"file", "si"};             // in the enum's order
@@ -256,6 +267,8 @@ std::optional<double> parse_number(std::string_view text) {
 std::span<const SceneField> scene_fields() { return kFields; }
 
 const SceneField& size_factor_field() { return kSizeFactor; }
+const SceneField& pull_radius_field() { return kPullRadius; }
+const SceneField& pull_stiffness_field() { return kPullStiffness; }
 
 const SceneField* find_scene_field(std::string_view key) {
   const auto found =

@@ -60,6 +60,9 @@ std::vector<MaterialValue> material_values();
 
 /// The key `factor` of [[size]].
 const SceneField& size_factor_field();
+/// The keys `radius` and `stiffness` of [[material]].
+const SceneField& pull_radius_field();
+const SceneField& pull_stiffness_field();
 
 /// In the order of a printed scene.
 std::span<const SceneField> scene_fields();

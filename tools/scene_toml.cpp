@@ -162,11 +162,25 @@ class SceneReader : public detail::TomlReader {
     set_from_text(scene_, field, string(node, where), where);
   }
 
+  /// Regions of a lattice: Gmsh names its groups, Medit numbers them.
+  std::vector<std::string> names_or_numbers(const toml::node& node, const std::string& where) const {
+    const toml::array* array = node.as_array();
+    if (array == nullptr) refuse_type(node, where, "an array of names or numbers of regions");
+    std::vector<std::string> names;
+    for (const toml::node& entry : *array)
+      names.push_back(entry.is_integer() ? std::to_string(integer(entry, where)) : string(entry, where));
+    return names;
+  }
+
   BoneMaterial material(const toml::table& table, const std::string& where) const {
     BoneMaterial material;
-    std::vector<Entry> entries{{"bones", [&](const toml::node& node, const std::string& at) {
-                                  material.bones = strings(node, at);
-                                }}};
+    std::vector<Entry> entries{
+        {"bones", [&](const toml::node& node, const std::string& at) { material.bones = strings(node, at); }},
+        {"region",
+         [&](const toml::node& node, const std::string& at) { material.region = string(node, at); }},
+        {"regions", [&](const toml::node& node, const std::string& at) {
+           material.regions = names_or_numbers(node, at);
+         }}};
     for (const MaterialValue& value : material_values()) {
       entries.push_back({std::string(value.field->key),
                          [this, value, &material](const toml::node& node, const std::string& at) {
@@ -175,7 +189,7 @@ class SceneReader : public detail::TomlReader {
                          }});
     }
     read_table(table, where, entries);
-    if (material.bones.empty()) {
+    if (material.bones.empty() && material.regions.empty()) {
       throw ConfigError(
           fmt::format("{}: {}: no bones, expected at least one name or pattern; hint: bones = [\"tail*\"]",
                       place(table), where));

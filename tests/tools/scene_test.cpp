@@ -67,6 +67,35 @@ TEST_F(SceneFile, ReadsWhichBonesTakePartAndHowLargeCellsAre) {
             "scene.toml:1: bones_include: got a string, expected an array of strings");
 }
 
+TEST_F(SceneFile, TakesRegionsOfALatticeByNameAndNumber) {
+  const Scene scene = read("lattice = \"a.msh\"\n[[material]]\nregions = [\"belly\", 7]\nyoung = 100.0");
+  EXPECT_EQ(scene.materials.at(0).regions, (std::vector<std::string>{"belly", "7"}));
+  Scene other = scene;
+  other.materials[0].radius = 0.1;
+  const auto message = [](const Scene& wrong) -> std::string {
+    try {
+      wrong.validate();
+    } catch (const assets::ConfigError& e) {
+      return e.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(message(scene), "accepted");
+  EXPECT_EQ(
+      message(other),
+      "material 1: regions of a lattice, expected no bones, radius, stiffness or region with them; hint: "
+      "two materials");
+  other = scene;
+  other.lattice.clear();
+  EXPECT_EQ(
+      message(other),
+      "material 1: regions, expected none as a lattice that is built has none; hint: bones, or a lattice "
+      "of your own");
+  EXPECT_EQ(refusal("[[material]]\nregions = 7"),
+            "scene.toml:2: material 1: regions: got a whole number, expected an array of names or numbers of "
+            "regions");
+}
+
 TEST_F(SceneFile, SaysWhatIsWrongWithSizes) {
   EXPECT_EQ(refusal("[[size]]\nbones = [\"a\"]\nfactor = 5"),
             "scene.toml:3: size 1: factor: got 5, expected 0.25 <= factor <= 4; hint: 0.5");
@@ -121,6 +150,9 @@ factor = 0.5
 bones = ["belly"]
 poisson = 0.3
 density = 900
+radius = 0.02
+stiffness = 40
+region = "trunk"
 )");
   Scene expected;
   expected.rig = "hero.glb";
@@ -150,7 +182,8 @@ density = 900
   expected.settle = 0.0;
   expected.threads = 2;
   expected.output_mesh = "hero.obj";
-  expected.materials = {{{"tail*", "ear_?"}, 5000.0, {}, {}}, {{"belly"}, {}, 0.3, 900.0}};
+  expected.materials = {{{"tail*", "ear_?"}, 5000.0, {}, {}},
+                        {{"belly"}, {}, 0.3, 900.0, 0.02, 40.0, "trunk", {}}};
   EXPECT_EQ(scene, expected);
 }
 
@@ -321,6 +354,10 @@ Scene random_scene(std::mt19937_64& rng) {
   if (index(2) == 1) scene.output_mesh = text();
   for (int i = index(3); i > 0; --i) {
     scene.materials.push_back({{text(), text()}, 1.0 + unit(), std::nullopt, 500.0 * (1.0 + unit())});
+    if (index(2) == 1) scene.materials.back().radius = 1e-3 + unit();
+    if (index(2) == 1) scene.materials.back().stiffness = 100.0 * unit();
+    if (index(2) == 1) scene.materials.back().region = text();
+    if (!built && index(2) == 1) scene.materials.push_back({{}, 1e4, {}, {}, {}, {}, {}, {text(), "7"}});
   }
   return scene;
 }
@@ -433,21 +470,19 @@ TEST(SceneValues, AreCheckedWhereverTheyComeFrom) {
             "material 1: no bones, expected at least one name");
 }
 
-TEST(SceneMaterials, FindTheBonesByPatternAndTheLaterOneWins) {
+TEST(SceneMaterials, FindTheBonesByPattern) {
   Scene scene;
   scene.materials = {{{"*"}, 1.0, {}, {}}, {{"tail_?", "ear*l"}, 2.0, {}, {}}, {{"tail_2"}, 3.0, {}, {}}};
   EXPECT_EQ(
-      material_of_bone(scene, "r.glb", {"tail_1", "tail_2", "tail_10", "ear_tip_l", "ear_tip_r", "earl"}),
-      (std::vector<int>{1, 2, 0, 1, 0, 1}));
-  scene.materials = {{{"tail_2"}, 3.0, {}, {}}};
-  EXPECT_EQ(material_of_bone(scene, "r.glb", {"tail_1", "tail_2"}), (std::vector<int>{-1, 0}));
+      bones_of_materials(scene, "r.glb", {"tail_1", "tail_2", "tail_10", "ear_tip_l", "ear_tip_r", "earl"}),
+      (std::vector<std::vector<int>>{{0, 1, 2, 3, 4, 5}, {0, 1, 3, 5}, {1}}));
 }
 
 TEST(SceneMaterials, RefuseAPatternThatFitsNoBone) {
   Scene scene;
   scene.materials = {{{"hip"}, 1.0, {}, {}}, {{"tial*"}, 2.0, {}, {}}};
   try {
-    material_of_bone(scene, "r.glb", {"hip", "tail"});
+    bones_of_materials(scene, "r.glb", {"hip", "tail"});
     FAIL() << "accepted";
   } catch (const assets::InputError& e) {
     EXPECT_STREQ(e.what(), "r.glb: material 2: no bone is named 'tial*'; hint: did you mean tail*?");
