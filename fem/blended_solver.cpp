@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -344,16 +345,24 @@ struct Rest {
 
 }  // namespace
 
+/// The longest history of any integrator's stage.
+constexpr std::size_t kMostPast = 3;
+
 /// What all regions of one stage share.
 struct BlendedSolver::Impl::StepData {
-  const State* state;
   StagePoses poses;
   Stage stage;
   double h, alpha, beta;
   Eigen::Vector3d gravity;
-  bool use_past;
-  Points x_h, v_h, x_known, v_known, x_now, x_past;  ///< coefficients.
-  Rest rest_end, rest_now, rest_past;
+  Points x_h, v_h, x_known, v_known;  ///< coefficients.
+  Rest rest;                          ///< at the stage.
+  struct Past {
+    double share;
+    const PosedFrames* pose;
+    Points x;  ///< coefficients.
+    Rest rest;
+  };
+  std::vector<Past> past;
 };
 
 namespace {
@@ -367,19 +376,19 @@ Eigen::Vector4d lanes(const Eigen::Vector3d& v) { return {v[0], v[1], v[2], 0.0}
 void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) const {
   const Region& region = *s.region;
   const RegionTransform end = transform_of(region, *step.poses.stage);
-  const RegionTransform now = transform_of(region, *step.poses.now);
-  const RegionTransform past = step.use_past ? transform_of(region, *step.poses.before) : now;
   const Eigen::Matrix3d to_local = end.rotation.transpose();
-  const Eigen::Matrix3d now_local = now.rotation.transpose(), past_local = past.rotation.transpose();
+  // Of every time of the history: its origin, its axes, and the way from then to the stage with the region.
+  std::array<Eigen::Vector3d, kMostPast> origin;
+  std::array<Eigen::Matrix3d, kMostPast> past_local;
+  std::array<Eigen::Affine3d, kMostPast> from_past;
+  for (std::size_t j = 0; j < step.past.size(); ++j) {
+    const RegionTransform then = transform_of(region, *step.past[j].pose);
+    origin[j] = then.origin;
+    past_local[j] = then.rotation.transpose();
+    from_past[j] = end.from_rest * then.from_rest.inverse();
+  }
   const double th = step.stage.theta * step.h;
   const double b = step.beta / (step.stage.kappa * step.h);
-  // From now, and from one step earlier, to the end of the stage with the region.
-  const Eigen::Affine3d from_now = end.from_rest * now.from_rest.inverse();
-  const Eigen::Affine3d from_past = end.from_rest * past.from_rest.inverse();
-  const auto carry = [](const Eigen::Affine3d& map, const Eigen::Vector3d& x,
-                        double is_value) -> Eigen::Vector3d {
-    return map.linear() * x + is_value * map.translation();
-  };
 
   std::vector<Inputs>& coefficients = s.values_are_coefficients ? s.inputs : s.coefficients;
   for (std::size_t k = 0; k < s.functions.size(); ++k) {
@@ -388,18 +397,15 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
     // A detail is a difference of positions: it turns with the region but does not travel.
     const double is_value = coordinates.is_value[static_cast<std::size_t>(f)] ? 1.0 : 0.0;
     const auto rest_of = [&](const Rest& rest) { return rest.of(*body, coordinates, region, f); };
-    const Eigen::Vector3d x_now = step.x_now.row(f).transpose();
     const Eigen::Vector3d x_stage = (known ? step.x_known : step.x_h).row(f).transpose();
     const Eigen::Vector3d p = to_local * (x_stage - is_value * end.origin);
-    const Eigen::Vector3d u_end = p - rest_of(step.rest_end);
-    Eigen::Vector3d u_past = now_local * (x_now - is_value * now.origin) - rest_of(step.rest_now);
-    Eigen::Vector3d carried = carry(from_now, x_now, is_value);
-    if (step.use_past) {
-      const Eigen::Vector3d x_past = step.x_past.row(f).transpose();
-      const Eigen::Vector3d u_before =
-          past_local * (x_past - is_value * past.origin) - rest_of(step.rest_past);
-      u_past += step.stage.look_back * (u_past - u_before);
-      carried += step.stage.look_back * (carried - carry(from_past, x_past, is_value));
+    const Eigen::Vector3d u_end = p - rest_of(step.rest);
+    Eigen::Vector3d u_past = Eigen::Vector3d::Zero(), carried = Eigen::Vector3d::Zero();
+    for (std::size_t j = 0; j < step.past.size(); ++j) {
+      const StepData::Past& past = step.past[j];
+      const Eigen::Vector3d x = past.x.row(f).transpose();
+      u_past += past.share * (past_local[j] * (x - is_value * origin[j]) - rest_of(past.rest));
+      carried += past.share * (from_past[j].linear() * x + is_value * from_past[j].translation());
     }
     // v+ - v_frame is the integrator's own difference of the flesh's place in the region: as exact as its
     // step.
@@ -447,7 +453,7 @@ void BlendedSolver::Impl::solve_region(RegionSystem& s, const StepData& step, co
   }
   for (const auto& [t, rows] : s.ties) {
     const Tie& tie = body->ties[static_cast<std::size_t>(t)];
-    const auto& growth = step.rest_end.growth;
+    const auto& growth = step.rest.growth;
     const Eigen::Affine3d target = tie_target(*body, tie, *step.poses.stage, growth ? &*growth : nullptr);
     const Eigen::Matrix3d turn = to_local * target.linear();
     const Eigen::Vector3d centre = to_local * (target * tie.centre_rest - end.origin);
@@ -518,37 +524,34 @@ Points known_velocity(const Body& body, const State& state, const Points& x_h, c
 
 }  // namespace
 
-lattice::Points BlendedSolver::stage_velocity(const State& state, const Points& x_h, const Points& v_h,
-                                              const StagePoses& poses, double h, Integrator integrator,
-                                              const Eigen::Vector3d& gravity, bool use_past) {
+lattice::Points BlendedSolver::stage_velocity(const StageProblem& problem) {
   const Body& body = *impl_->body;
+  const Points& x_h = *problem.x_h;
+  const double h = problem.h;
   Impl::StepData step;
-  step.state = &state;
-  step.poses = poses;
-  step.stage = stage_of(integrator);
+  step.poses = problem.poses;
+  step.stage = stage_of(problem.integrator);
   step.h = h;
   step.alpha = body.damping.alpha();
   step.beta = body.damping.beta();
-  step.gravity = gravity;
-  step.use_past = use_past;
+  step.gravity = problem.gravity;
   const double eta_h = step.stage.eta * h;
-  // A start's stage lies at t + eta h.
-  const double elapsed = use_past ? step.stage.reach * h : eta_h;
-  const Points v_known = known_velocity(body, state, x_h, poses, elapsed, eta_h, impl_->systems.size() > 1);
+  const Points v_known = known_velocity(body, *problem.state, x_h, problem.poses, problem.elapsed, eta_h,
+                                        impl_->systems.size() > 1);
   const Points x_known = x_h + eta_h * v_known;
   const Coordinates& coordinates = impl_->coordinates;
   coordinates.analyse(x_h, step.x_h);
-  coordinates.analyse(v_h, step.v_h);
+  coordinates.analyse(*problem.v_h, step.v_h);
   coordinates.analyse(x_known, step.x_known);
   coordinates.analyse(v_known, step.v_known);
-  coordinates.analyse(state.x, step.x_now);
-  if (use_past) coordinates.analyse(state.x_past, step.x_past);
+  step.rest = Rest(body, coordinates, *problem.poses.stage);
+  assert(problem.past.size() <= kMostPast && "no integrator looks further back");
+  for (const PastPlace& place : problem.past) {
+    step.past.push_back({place.share, place.pose, {}, Rest(body, coordinates, *place.pose)});
+    coordinates.analyse(*place.x, step.past.back().x);
+  }
 
-  step.rest_end = Rest(body, coordinates, *poses.stage);
-  step.rest_now = Rest(body, coordinates, *poses.now);
-  if (use_past) step.rest_past = Rest(body, coordinates, *poses.before);
-
-  const std::vector<Factor>& factors = impl_->factors.at({h, integrator});
+  const std::vector<Factor>& factors = impl_->factors.at({h, problem.integrator});
   std::vector<RegionSystem>& systems = impl_->systems;
   tbb::parallel_for(std::size_t{0}, systems.size(),
                     [&](std::size_t i) { impl_->gather_inputs(systems[i], step); });

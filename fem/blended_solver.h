@@ -4,8 +4,7 @@
 
 #include "fem/body.h"
 #include "fem/factor.h"
-#include "fem/integrator.h"
-#include "fem/state.h"
+#include "fem/stage_problem.h"
 
 /// Blended local linearisation: one prefactored linear system per region, blended by the region weights
 /// ([Capell02, sec. 5]).
@@ -22,13 +21,9 @@ class BlendedSolver {
   /// already. The report names the region and vertex where a system is not positive definite.
   [[nodiscard]] Factor::Report prepare(double h, Integrator integrator);
 
-  /// Velocity v+ [m/s] at the stage for all leaf vertices, from stage predictors: x_h, v_h as in
-  /// integrator.h. Bone vertices get the velocity that puts them on the clip at the stage. prepare(h,
-  /// integrator) must have succeeded. `gravity` [m/s^2]. With `use_past` false the damping history is the
-  /// present alone.
-  lattice::Points stage_velocity(const State& state, const lattice::Points& x_h, const lattice::Points& v_h,
-                                 const StagePoses& poses, double h, Integrator integrator,
-                                 const Eigen::Vector3d& gravity, bool use_past);
+  /// Velocity v+ [m/s] at the stage for all leaf vertices. Bone vertices get the velocity that puts them on
+  /// the clip at the stage. prepare(h, integrator) must have succeeded. problem.force is not looked at.
+  lattice::Points stage_velocity(const StageProblem& problem);
 
   SolverCounts counts() const;
 

@@ -93,4 +93,15 @@ PosedFrames pose_frames(const FrameTree& tree, std::vector<Eigen::Affine3d> pose
   return posed;
 }
 
+std::optional<PosedFrames> mean_pose(const FrameTree& tree, const PosedFrames& a, const PosedFrames& b) {
+  for (std::size_t f = 0; f < tree.frames.size(); ++f) {
+    // tr R = 1 + 2 cos(angle).
+    if ((a.frames[f].rotation.transpose() * b.frames[f].rotation).trace() < 1.0) return std::nullopt;
+  }
+  std::vector<Eigen::Affine3d> joints = a.joints;
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    joints[j].matrix() = 0.5 * (a.joints[j].matrix() + b.joints[j].matrix());
+  return pose_frames(tree, std::move(joints), 0.5 * (a.time + b.time));
+}
+
 }  // namespace sinew::fem

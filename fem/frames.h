@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,11 @@ struct PosedFrames {
 /// Throws std::invalid_argument naming the joint and the time where a frame's transform is not finite or
 /// squashes space flat (scale below 1e-6), so that it cannot be inverted.
 PosedFrames pose_frames(const FrameTree& tree, std::vector<Eigen::Affine3d> pose_from_rest, double time);
+
+/// Halfway between two poses along the chord: the mean of the joints' maps, in which every point that moves
+/// with a joint stands at the mean of its two places. Nothing where a frame turns by more than a right angle
+/// between the two, as a mean of opposite rotations has no volume.
+std::optional<PosedFrames> mean_pose(const FrameTree& tree, const PosedFrames& a, const PosedFrames& b);
 
 /// Rotation of the polar decomposition; for a mirroring matrix the nearest proper rotation.
 Eigen::Matrix3d polar_rotation(const Eigen::Matrix3d& matrix);

@@ -11,8 +11,8 @@ namespace sinew::fem {
 enum class Integrator {
   Bdf2,              ///< second order, damps little; the default.
   BackwardEuler,     ///< first order, damps much; cannot fail.
-  TrBdf2,            ///< two stages with one matrix; second order unless bones accelerate (1.0 to 1.5 seen).
-  ImplicitMidpoint,  ///< second order, keeps the energy of a linear body; rings after a jolt.
+  TrBdf2,            ///< two stages with one matrix; second order, the most exact of them for one region.
+  ImplicitMidpoint,  ///< second order without damping, keeps the energy of a linear body; rings after a jolt.
 };
 
 struct Stage {
@@ -26,13 +26,14 @@ struct Stage {
 };
 
 /// Where TR-BDF2 breaks its step, 2 - sqrt(2): both stages then have the same eta and theta, hence one factor
-/// ([Bank85, sec. 3]). The first is the implicit midpoint rule over gamma h, which for linear bodies is the
-/// trapezoidal rule: the state behind it needs no forces.
+/// ([Bank85, sec. 3]). The forces at the begin of the first, the trapezoidal rule, are those that ended the
+/// last step, M (v - v_h) / (theta h): known without being computed, and for bones what BDF2 makes of their
+/// own velocities. Of the very first step it is the implicit midpoint rule over gamma h, which needs none.
 inline constexpr double kTrBdf2Break = 0.58578643762690495;
 
-/// The coefficients of an integrator's stage. A start, and the whole of the implicit midpoint rule, is one
-/// stage without history to t + theta h, then extrapolated to the end of the step: the same coefficients,
-/// hence the same factor.
+/// The coefficients of an integrator's last stage; those before it have the same eta, theta and kappa, hence
+/// the same factor. A start of BDF2, and the whole of the implicit midpoint rule, is one stage without
+/// history to t + theta h, then extrapolated to the end of the step.
 constexpr Stage stage_of(Integrator integrator) {
   constexpr double kRest = 1.0 - kTrBdf2Break;
   switch (integrator) {

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 namespace sinew::fem {
 
 using lattice::Points;
@@ -17,6 +20,23 @@ Points skinned_frames(const Body& body, const PosedFrames& posed) {
     x.row(a) = sum.transpose();
   }
   return x;
+}
+
+Points carried(const Body& body, const Points& x, const PosedFrames& from, const PosedFrames& to) {
+  std::vector<Eigen::Affine3d> map;
+  for (std::size_t f = 0; f < body.tree.frames.size(); ++f)
+    map.push_back(to.frames[f].from_rest * from.frames[f].to_rest);
+  Points moved(x.rows(), 3);
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, body.mesh.num_vertices(), 128), [&](const tbb::blocked_range<int>& range) {
+        for (int a = range.begin(); a != range.end(); ++a) {
+          Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+          for (FrameWeights::InnerIterator it(body.weights, a); it; ++it)
+            sum += it.value() * (map[static_cast<std::size_t>(it.col())] * x.row(a).transpose());
+          moved.row(a) = sum.transpose();
+        }
+      });
+  return moved;
 }
 
 void place_bones(const Body& body, const PosedFrames& posed, Points& x) {

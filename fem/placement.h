@@ -12,6 +12,11 @@ lattice::Points skinned_positions(const Body& body, const PosedFrames& posed);
 /// The same without bones and parents put right: where the flesh is at home, for measuring distances.
 lattice::Points skinned_frames(const Body& body, const PosedFrames& posed);
 
+/// x = sum_f s_f T_f^to (T_f^from)^-1 x: moved with the frames; inactive vertices and bones are not put
+/// right.
+lattice::Points carried(const Body& body, const lattice::Points& x, const PosedFrames& from,
+                        const PosedFrames& to);
+
 /// Puts bone vertices exactly on the clip.
 void place_bones(const Body& body, const PosedFrames& posed, lattice::Points& x);
 

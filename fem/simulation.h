@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -83,11 +84,15 @@ class Simulation {
   SimulationReport step_once(double h);
   /// One stage to now + eta h, extrapolated to now + span with the pose `next`.
   SolveReport stage_without_history(double span, double h, const PosedFrames& next, State& after);
-  /// One stage to the pose `next` from the present and state_.x_past.
-  SolveReport stage_with_history(double h, const PosedFrames& next, State& after);
-  void accept(State after, PosedFrames next);
-  StageProblem stage(const lattice::Points& x_h, const lattice::Points& v_h, const StagePoses& poses,
-                     double h, double time, bool use_past);
+  /// One stage of BDF2 to poses.stage from a state and the one before it.
+  SolveReport bdf2_stage(const State& from, const StagePoses& poses, double h, State& after);
+  SolveReport midpoint_step(double h, const PosedFrames& next, State& after);
+  /// The first part of TR-BDF2, to the pose `middle`: the trapezoidal rule, from how the last step ended.
+  SolveReport trapezoidal_stage(double h, const PosedFrames& middle, State& after);
+  SolveReport tr_bdf2_step(double h, const PosedFrames& next, State& after);
+  StageProblem stage(const State& from, const lattice::Points& x_h, const lattice::Points& v_h,
+                     const StagePoses& poses, double elapsed, double h, double time);
+  const PosedFrames* before_pose() const { return has_before_ ? &past_ : nullptr; }
   SimulationReport failed(const SolveReport& solve) const;
   bool check(SimulationReport& report) const;
 
@@ -104,7 +109,14 @@ class Simulation {
   PosedFrames now_, past_;   ///< their poses.
   bool has_before_ = false;  ///< past_ is one real step earlier.
   double last_h_ = 0.0;
-  long base_step_ = 0;  ///< whole steps taken: time is start + n h, never a running sum.
+  /// Where TR-BDF2 broke its last step, and the acceleration with which it ended.
+  struct StepEnd {
+    lattice::Points x_middle, acceleration;  ///< num_vertices x 3 [m], [m/s^2].
+    PosedFrames middle;
+    double h = 0.0;  ///< [s].
+  };
+  std::optional<StepEnd> step_end_;  ///< empty before the first step.
+  long base_step_ = 0;               ///< whole steps taken: time is start + n h, never a running sum.
   int part_ = 0;  ///< sub-steps taken of the step under way: a frame may be sampled between two of them.
   int halvings_ = 0;
   int steps_since_change_ = 0;

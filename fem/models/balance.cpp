@@ -76,48 +76,27 @@ Points predicted_velocity(const Body& body, const State& state, const StagePoses
 
 }  // namespace
 
-Points carried(const Body& body, const Points& x, const PosedFrames& from, const PosedFrames& to) {
-  std::vector<Eigen::Affine3d> map;
-  for (std::size_t f = 0; f < body.tree.frames.size(); ++f)
-    map.push_back(to.frames[f].from_rest * from.frames[f].to_rest);
-  Points moved(x.rows(), 3);
-  over_vertices(body, [&](int a) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it)
-      sum += it.value() * (map[static_cast<std::size_t>(it.col())] * x.row(a).transpose());
-    moved.row(a) = sum.transpose();
-  });
-  return moved;
-}
-
 Balance stage_balance(const Body& body, const StageProblem& p) {
   const Stage stage = stage_of(p.integrator);
   const double eta_h = stage.eta * p.h, kappa_h = stage.kappa * p.h, alpha = body.damping.alpha();
   const State& state = *p.state;
   Balance b;
   b.pose = p.poses.stage;
-  if (p.use_past) {
-    b.past = {{1.0 + stage.look_back, &state.x}, {-stage.look_back, &state.x_past}};
-    b.past_poses = {p.poses.now, p.poses.before};
-  } else {
-    b.past = {{1.0, &state.x}};
-    b.past_poses = {p.poses.now};
-  }
+  b.past = p.past;
   b.damping = body.damping.beta() / kappa_h;
 
   // M (v+ - v_h) = theta h F and mass damping alpha M (v+ - v_frame), with v+ = (x+ - x_h) / (eta h) and
   // v_frame the integrator's own difference of the flesh's place among its frames.
   Points carried_past = Points::Zero(state.x.rows(), 3);
-  for (std::size_t k = 0; k < b.past.size(); ++k)
-    carried_past += b.past[k].share * carried(body, *b.past[k].x, *b.past_poses[k], *p.poses.stage);
+  for (const PastPlace& past : b.past)
+    carried_past += past.share * carried(body, *past.x, *past.pose, *p.poses.stage);
   const double of_velocity = 1.0 / (stage.theta * p.h);
   b.inertia = (of_velocity + alpha) / eta_h;
   b.target = *p.x_h + (of_velocity * *p.v_h + (alpha / kappa_h) * (carried_past - *p.x_h)) / b.inertia;
   b.tie_target = tie_targets(body, *p.poses.stage);
   b.load = weights(body, p.gravity, p.force);
 
-  const double elapsed = p.use_past ? stage.reach * p.h : eta_h;  // a start's stage lies at t + eta h
-  b.guess = state.x + elapsed * predicted_velocity(body, state, p.poses, elapsed);
+  b.guess = state.x + p.elapsed * predicted_velocity(body, state, p.poses, p.elapsed);
   place_bones(body, *p.poses.stage, b.guess);
   fill_inactive_leaves(body, b.guess);
   return b;

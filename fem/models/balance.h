@@ -11,15 +11,14 @@ namespace sinew::fem {
 
 /// Everything but the elastic force f; bones included in `guess` stay where they are.
 struct Balance {
-  double inertia = 0.0;             ///< mass matrix per squared step, with mass damping [1/s^2]; 0 at rest.
-  lattice::Points target;           ///< where inertia alone would take the flesh [m]; empty at rest.
-  lattice::Points tie_target;       ///< sum_b P_b (T_b X) [N]; the ties' force is that less P x.
-  lattice::Points load;             ///< gravity and loads [N].
-  double damping = 0.0;             ///< stiffness damping, beta / (kappa h) [-]; 0 at rest.
-  std::vector<PastPositions> past;  ///< what the strain's rate is measured against.
-  std::vector<const PosedFrames*> past_poses;  ///< of those positions.
-  const PosedFrames* pose = nullptr;           ///< at the solution.
-  lattice::Points guess;  ///< first guess of the solution, in the space of the unknowns [m].
+  double inertia = 0.0;               ///< mass matrix per squared step, with mass damping [1/s^2]; 0 at rest.
+  lattice::Points target;             ///< where inertia alone would take the flesh [m]; empty at rest.
+  lattice::Points tie_target;         ///< sum_b P_b (T_b X) [N]; the ties' force is that less P x.
+  lattice::Points load;               ///< gravity and loads [N].
+  double damping = 0.0;               ///< stiffness damping, beta / (kappa h) [-]; 0 at rest.
+  std::vector<PastPlace> past;        ///< what the strain's rate is measured against.
+  const PosedFrames* pose = nullptr;  ///< at the solution.
+  lattice::Points guess;              ///< first guess of the solution, in the space of the unknowns [m].
 };
 
 /// Of a stage. The guess moves the flesh with its frames and lets it keep its velocity relative to them.
@@ -33,11 +32,6 @@ lattice::Points outer_forces(const Body& body, const Balance& balance, const lat
 
 /// Sum of the norms of the forces that outer_forces adds up: what residuals are compared with.
 double force_scale(const Body& body, const Balance& balance, const lattice::Points& x);
-
-/// x = sum_f s_f T_f^to (T_f^from)^-1 x: moved with the frames; inactive vertices and bones are not put
-/// right.
-lattice::Points carried(const Body& body, const lattice::Points& x, const PosedFrames& from,
-                        const PosedFrames& to);
 
 /// Sums of cell vectors at the leaf vertices, in the order of the cells.
 class CellSum {

@@ -105,10 +105,14 @@ class Blended final : public Model {
 
   SolveReport solve_stage(const StageProblem& p, lattice::Points& velocity) override {
     // Forces enter the systems as M v_h does: theta h M^-1 f more velocity is theta h f more momentum.
-    lattice::Points pushed;
-    if (p.force != nullptr) pushed = *p.v_h + stage_of(p.integrator).theta * p.h * acceleration(*p.force);
-    velocity = solver_.stage_velocity(*p.state, *p.x_h, p.force != nullptr ? pushed : *p.v_h, p.poses, p.h,
-                                      p.integrator, p.gravity, p.use_past);
+    if (p.force == nullptr) {
+      velocity = solver_.stage_velocity(p);
+      return {};
+    }
+    const lattice::Points pushed = *p.v_h + stage_of(p.integrator).theta * p.h * acceleration(*p.force);
+    StageProblem loaded = p;
+    loaded.v_h = &pushed;
+    velocity = solver_.stage_velocity(loaded);
     return {};
   }
 
@@ -174,7 +178,8 @@ lattice::Points Blended::first_velocity(const PoseProblem& problem, double h, co
   stage.x_h = &state.x;
   stage.v_h = &state.v;
   stage.poses = {&earlier, &now, &later};
-  stage.h = h;
+  stage.past = {{1.0, &state.x, &now}};
+  stage.elapsed = stage.h = h;
   stage.integrator = Integrator::BackwardEuler;
   stage.gravity = problem.gravity;
   stage.force = problem.force;

@@ -3,16 +3,11 @@
 #include <span>
 
 #include "fem/body.h"
+#include "fem/stage_problem.h"
 
 /// What a nonlinear model is: the energy of one leaf cell and its derivatives. The solver
 /// (fem/models/newton_model.h) knows no materials, and an energy knows no system.
 namespace sinew::fem {
-
-/// Positions of the past with their share in the stage's history: u_h = sum_k share_k u_k.
-struct PastPositions {
-  double share = 1.0;
-  const lattice::Points* x = nullptr;
-};
 
 /// Corners of a leaf cell as columns, relative to its first corner, so that far positions stay accurate.
 inline CellPoints cell_points(const lattice::Points& x, const lattice::HexVertices& cell) {
@@ -28,7 +23,7 @@ class CellEnergy {
 
   /// Until the next call energies hold the viscosity of a stage as well: rate [-] times the elastic energy
   /// (at small strain) of the change since the past. rate is beta / (kappa h); 0 switches it off.
-  virtual void set_damping(double rate, std::span<const PastPositions> past) = 0;
+  virtual void set_damping(double rate, std::span<const PastPlace> past) = 0;
 
   /// [J], of leaf cell `cell` with corners x. Thread-safe, as are the derivatives.
   virtual double energy(int cell, const CellPoints& x) const = 0;

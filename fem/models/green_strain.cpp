@@ -137,13 +137,13 @@ GreenStrainEnergy::GreenStrainEnergy(const Body& body, double elastic) : body_(b
   }
 }
 
-void GreenStrainEnergy::set_damping(double rate, std::span<const PastPositions> past) {
+void GreenStrainEnergy::set_damping(double rate, std::span<const PastPlace> past) {
   rate_ = rate;
   if (rate == 0.0) return;
   past_.resize(geometry_.size());
   tbb::parallel_for(std::size_t{0}, past_.size(), [&](std::size_t c) {
     past_[c].setZero();
-    for (const PastPositions& p : past)
+    for (const PastPlace& p : past)
       past_[c] += p.share * green_strains(geometry_[c], cell_points(*p.x, body_.mesh.cells[c]));
   });
 }

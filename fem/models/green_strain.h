@@ -37,7 +37,7 @@ class GreenStrainEnergy final : public CellEnergy {
  public:
   GreenStrainEnergy(const Body& body, double elastic);
 
-  void set_damping(double rate, std::span<const PastPositions> past) override;
+  void set_damping(double rate, std::span<const PastPlace> past) override;
   double energy(int cell, const CellPoints& x) const override;
   CellVector gradient(int cell, const CellPoints& x) const override;
   CellStiffness hessian(int cell, const CellPoints& x) const override;

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "fem/body.h"
-#include "fem/integrator.h"
-#include "fem/state.h"
+#include "fem/stage_problem.h"
 
 /// The ladder: models of the flesh from skinning to full nonlinear elasticity behind one interface. All of
 /// them move the same State along the same poses; the time loop (fem/simulation.h) does not know which one it
@@ -31,19 +30,6 @@ struct [[nodiscard]] SolveReport {
   std::string message;
 
   bool ok() const { return status == SolveStatus::Ok; }
-};
-
-/// One implicit stage, x+ = x_h + eta h v+ (fem/integrator.h), about to be solved for v+.
-struct StageProblem {
-  const State* state = nullptr;          ///< at the step's begin.
-  const lattice::Points* x_h = nullptr;  ///< stage predictor of positions, num_vertices x 3 [m].
-  const lattice::Points* v_h = nullptr;  ///< stage predictor of velocities [m/s].
-  StagePoses poses;
-  double h = 0.0;  ///< step [s].
-  Integrator integrator = Integrator::Bdf2;
-  Eigen::Vector3d gravity{0, 0, 0};        ///< [m/s^2].
-  const lattice::Points* force = nullptr;  ///< further forces on the leaf vertices [N]; null for none.
-  bool use_past = false;                   ///< histories reach back to state->x_past; else the present alone.
 };
 
 /// A pose in which the flesh is to come to rest.

@@ -40,7 +40,7 @@ class NeoHookean final : public CellEnergy {
  public:
   explicit NeoHookean(const Body& body) : viscosity_(body, 0.0) {}
 
-  void set_damping(double rate, std::span<const PastPositions> past) override {
+  void set_damping(double rate, std::span<const PastPlace> past) override {
     viscosity_.set_damping(rate, past);
   }
   double energy(int cell, const CellPoints& x) const override {

@@ -89,8 +89,7 @@ class RotatedModel final : public Model {
 Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations, const Points& x) {
   std::vector<Rotations> past;
   if (balance.damping > 0.0) {
-    for (std::size_t k = 0; k < balance.past.size(); ++k)
-      past.push_back(rotations_(*balance.past[k].x, *balance.past_poses[k]));
+    for (const PastPlace& place : balance.past) past.push_back(rotations_(*place.x, *place.pose));
   }
   tbb::parallel_for(std::size_t{0}, forces_.size(), [&](std::size_t c) {
     const int cell = static_cast<int>(c);

@@ -70,13 +70,13 @@ class SpringEnergy final : public CellEnergy {
     });
   }
 
-  void set_damping(double rate, std::span<const PastPositions> past) override {
+  void set_damping(double rate, std::span<const PastPlace> past) override {
     rate_ = rate;
     if (rate == 0.0) return;
     past_.resize(springs_.size());
     tbb::parallel_for(std::size_t{0}, springs_.size(), [&](std::size_t c) {
       past_[c].assign(springs_[c].size(), 0.0);
-      for (const PastPositions& p : past) {
+      for (const PastPlace& p : past) {
         const CellPoints x = cell_points(*p.x, body_.mesh.cells[c]);
         for (std::size_t s = 0; s < past_[c].size(); ++s)
           past_[c][s] += p.share * (x.col(springs_[c][s].b) - x.col(springs_[c][s].a)).norm();

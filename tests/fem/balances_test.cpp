@@ -70,6 +70,7 @@ TEST(Momentum, OfAFreeBodyGrowsByItsWeightAlone) {
   for (const ModelInfo& info : models()) {
     if (!info.dynamic) continue;
     for (Integrator integrator : kIntegrators) {
+      if (info.name == "corotational" && integrator == Integrator::ImplicitMidpoint) continue;  // refused
       SimulationOptions options = options_of(std::string(info.name), integrator, 1.0 / 120.0);
       options.gravity = {0.0, -9.81, 2.0};
       Simulation simulation(body, still, 0.0, options);

@@ -65,7 +65,7 @@ TEST(CellEnergies, HaveGradientsThatAreTheirSlopes) {
   for (const Law& law : laws(body)) {
     for (bool damped : {false, true}) {
       const Points past = crumpled(body, rng), x = crumpled(body, rng);
-      const std::vector<PastPositions> history{{4.0 / 3.0, &past}, {-1.0 / 3.0, &body.mesh.points}};
+      const std::vector<PastPlace> history{{4.0 / 3.0, &past}, {-1.0 / 3.0, &body.mesh.points}};
       law.cells->set_damping(damped ? 0.7 : 0.0, history);
       for (int c = 0; c < 8; ++c) {
         CellPoints p = cell_points(x, body.mesh.cells[static_cast<std::size_t>(c)]);
@@ -91,7 +91,7 @@ TEST(CellEnergies, HaveHessiansThatAreTheSlopesOfTheirGradients) {
   for (const Law& law : laws(body)) {
     for (bool damped : {false, true}) {
       const Points past = crumpled(body, rng), x = crumpled(body, rng);
-      const std::vector<PastPositions> history{{1.0, &past}};
+      const std::vector<PastPlace> history{{1.0, &past}};
       law.cells->set_damping(damped ? 0.7 : 0.0, history);
       for (int c = 0; c < 8; ++c) {
         CellPoints p = cell_points(x, body.mesh.cells[static_cast<std::size_t>(c)]);
@@ -161,7 +161,7 @@ TEST(CellEnergies, DoNotSeeRigidMotion) {
   for (const Law& law : laws(body)) {
     const Points x = moved(body.mesh.points, 0.03, rng);
     const Points turned = (x * turn.transpose()).rowwise() + Eigen::RowVector3d(3.0, -4.0, 5.0);
-    const std::vector<PastPositions> history{{1.0, &x}};
+    const std::vector<PastPlace> history{{1.0, &x}};
     law.cells->set_damping(0.7, history);  // from x to x turned nothing strains: no viscosity
     for (int c = 0; c < 8; ++c) {
       const CellPoints p = cell_points(x, body.mesh.cells[static_cast<std::size_t>(c)]),
