@@ -352,8 +352,7 @@ fem::Body paint_body(const Character& character) {
 fem::SimulationOptions simulation_options(const Scene& scene) {
   fem::SimulationOptions options;
   options.step = scene.step;
-  options.integrator =
-      scene.integrator == Integrator::Bdf2 ? fem::Integrator::Bdf2 : fem::Integrator::BackwardEuler;
+  options.integrator = scene.integrator;
   options.model = scene.model;
   options.solver.precision =
       scene.precision == Precision::Double ? fem::Precision::Double : fem::Precision::Float;

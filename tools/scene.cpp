@@ -100,6 +100,16 @@ void check_no_builder_keys(const Scene& scene) {
   }
 }
 
+/// Flesh without inertia has no energy to keep and no velocity to be exact about.
+void check_integrator(const Scene& scene) {
+  if (fem::find_model(scene.model)->dynamic) return;
+  if (scene.integrator == Integrator::Bdf2 || scene.integrator == Integrator::BackwardEuler) return;
+  const SceneField& field = *find_scene_field("integrator");
+  throw assets::ConfigError(fmt::format(
+      "{}: got {}, expected nothing as the model {} stands where the pose puts it; hint: leave it out",
+      field.key, flag_text(scene, field), scene.model));
+}
+
 }  // namespace
 
 std::vector<MaterialValue> material_values() {
@@ -134,6 +144,7 @@ void check_material(const Scene& scene, const BoneMaterial& material, const std:
 void Scene::validate() const {
   for (const SceneField& field : scene_fields()) check_field(*this, field, std::string(field.key));
   if (plain) check_plain(*this);
+  check_integrator(*this);
   if (!lattice.empty()) check_no_builder_keys(*this);
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const std::string where = fmt::format("size {}", i + 1);

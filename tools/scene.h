@@ -12,7 +12,7 @@
 /// What one run of `sinew simulate` is asked to do: every flag of the command and every key of a scene file.
 namespace sinew::tools {
 
-enum class Integrator { Bdf2, BackwardEuler };
+using fem::Integrator;
 
 /// Numbers in which factors are kept for solving; everything else is double.
 enum class Precision { Double, Float };
@@ -148,6 +148,9 @@ struct Scene {
   std::optional<FrameRange> frames;
   /// Longest time that the flesh may take to settle before the first frame [s]; 0 ... 3600.
   double settle = 5.0;
+  /// What is written is the rig's own skinning plus this share of (model - `skin`) [-]; 0 ... 10, 0 = plain
+  /// skinning. Unset: the model's flesh itself.
+  std::optional<double> offset;
   /// The contact sheet of frames.
   Switch preview = Switch::On;
   /// Threads; 0 ... 1024, 0 = all. The results do not depend on it.

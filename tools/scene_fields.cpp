@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "assets/error.h"
+#include "fem/envelope.h"
 #include "tools/suggest.h"
 #include "tools/toml_text.h"
 
@@ -27,7 +28,8 @@ Overloaded(Ts...) -> Overloaded<Ts...>;  // clang 14 does not deduce aggregates 
 constexpr int kMaxFrame = 10'000'000;
 constexpr int kMaxCells = 1'000'000;
 
-// Ranges: where the method is tested, wide enough for an insect and for a whale. A NaN is in no range.
+// Ranges: what the method can take, wide enough for an insect and for a whale; fem/envelope.h is narrower. A
+// NaN is in no range.
 constexpr auto kFields = std::to_array<SceneField>({
     {"rig", PathMember{&Scene::rig}, "the character: glTF, GLB, FBX, Collada, ..."},
     {"output", PathMember{&Scene::output}, "directory that the results go to"},
@@ -91,7 +93,9 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"gravity", &Scene::gravity, "gravity, Y up", "each component", {-1e4, 1e4}, "m/s^2", "0,-9.81,0"},
     {"step", &Scene::step, "time step", "h", {1e-6, 0.1}, "s", "1/120"},
     {"model", ModelMember{&Scene::model}, "model of the flesh, from the cheapest to the most exact"},
-    {"integrator", &Scene::integrator, "bdf2 or backward-euler (more damped, cannot fail)"},
+    {"integrator", &Scene::integrator,
+     "bdf2, backward-euler (more damped, cannot fail), tr-bdf2 (two solves, most exact) or "
+     "implicit-midpoint (keeps energy, rings after a jolt)"},
     {"precision", &Scene::precision, "of the factors: double, or float (faster, relative error near 3e-7)"},
     {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
     {"frames", &Scene::frames, "output frames A-B, both included; left out: the whole clip"},
@@ -102,6 +106,13 @@ constexpr auto kFields = std::to_array<SceneField>({
      {0.0, 3600.0},
      "s",
      "5"},
+    {"offset",
+     &Scene::offset,
+     "write the rig's own skinning plus this share of (model - skin); left out: the flesh itself",
+     "offset",
+     {0.0, 10.0},
+     "",
+     "1"},
     {"preview", &Scene::preview, "on or off: the picture of eight frames"},
     {"threads",
      &Scene::threads,
@@ -130,9 +141,10 @@ constexpr SceneField kPullStiffness{"stiffness",
                                     "",
                                     "10, or 100 for soft bones"};
 
-const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler"};  // in the enum's order
-const std::vector<std::string> kPrecisionNames{"double", "float"};          // in the enum's order
-const std::vector<std::string> kOutputSpaceNames{"file", "si"};             // in the enum's order
+// In the enum's order.
+const std::vector<std::string> kIntegratorNames{"bdf2", "backward-euler", "tr-bdf2", "implicit-midpoint"};
+const std::vector<std::string> kPrecisionNames{"double", "float"};  // in the enum's order
+const std::vector<std::string> kOutputSpaceNames{"file", "si"};     // in the enum's order
 
 const std::vector<std::string> kSwitchNames{"off", "on"};  // in the enum's order
 
@@ -333,6 +345,31 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
           },
       },
       field.member);
+}
+
+std::vector<std::string> outside_envelope(const Scene& scene) {
+  std::vector<std::string> warnings;
+  const auto look = [&](const fem::TestedRange& range, double value, const std::string& where) {
+    if (range.contains(value)) return;
+    const SceneField& field = *find_scene_field(range.setting);
+    warnings.push_back(
+        fmt::format("{}{}: got {:g}{}{}, outside of {:g} ... {:g}, where every model is tested", where,
+                    range.setting, value, field.unit.empty() ? "" : " ", field.unit, range.low, range.high));
+  };
+  for (const fem::TestedRange& range : fem::kEnvelope) {
+    const SceneMember& member = find_scene_field(range.setting)->member;
+    if (const auto* number = std::get_if<double Scene::*>(&member)) look(range, scene.**number, "");
+    const auto* optional = std::get_if<std::optional<double> Scene::*>(&member);
+    if (optional != nullptr && scene.**optional) look(range, *(scene.**optional), "");
+    for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+      for (const MaterialValue& value : material_values()) {
+        const auto& of_bones = scene.materials[i].*value.member;
+        if (value.field->key == range.setting && of_bones)
+          look(range, *of_bones, fmt::format("material {}: ", i + 1));
+      }
+    }
+  }
+  return warnings;
 }
 
 void set_from_text(Scene& scene, const SceneField& field, std::string_view text, const std::string& where) {

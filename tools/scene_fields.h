@@ -94,6 +94,10 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
 /// checks it. Throws as check_number.
 void set_from_text(Scene& scene, const SceneField& field, std::string_view text, const std::string& where);
 
+/// One warning for every setting outside of the envelope in which every rung is tested (fem/envelope.h),
+/// those of single materials included.
+std::vector<std::string> outside_envelope(const Scene& scene);
+
 /// The value as a flag takes it; empty where it is unset.
 std::string flag_text(const Scene& scene, const SceneField& field);
 

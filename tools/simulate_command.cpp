@@ -20,6 +20,7 @@
 #include "assets/pc2.h"
 #include "assets/preview.h"
 #include "assets/sidecar.h"
+#include "fem/placement.h"
 #include "tools/body_fields.h"
 #include "tools/character.h"
 #include "tools/command.h"
@@ -28,6 +29,7 @@
 #include "tools/plain_loads.h"
 #include "tools/progress.h"
 #include "tools/run_report.h"
+#include "tools/scene_fields.h"
 #include "tools/simulate_options.h"
 
 namespace sinew::tools {
@@ -126,6 +128,22 @@ CharacterFrame frame_at(const Character& character, const std::vector<Eigen::Aff
   return frame;
 }
 
+/// The flesh on top of the rig's own skinning: `share` times what tells it from the bottom rung, flesh that
+/// the bones alone deform.
+void offset_from_skinning(const Character& character, const fem::Body& body,
+                          const std::vector<Eigen::Affine3d>& pose, double time, double share,
+                          CharacterFrame& frame) {
+  const Points bottom =
+      body.skin.weights * fem::skinned_positions(body, fem::pose_frames(body.tree, pose, time));
+  const std::vector<int>& map = character.input.skin.surface_of_vertex;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (map[i] < 0) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    frame.simulated.row(row) =
+        frame.skinned.row(row) + share * (frame.simulated.row(row) - bottom.row(map[i]));
+  }
+}
+
 std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> posed_bones(
     const lattice::ControlLattice& lattice, const std::vector<Eigen::Affine3d>& pose) {
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> bones;
@@ -161,6 +179,7 @@ void say_what_runs(const Scene& scene, const Character& c, const FrameRange& fra
       "at {:g} Hz",
       l.complex.cells.size(), l.complex.points.rows(), l.bones.size(), c.body_options.material.young,
       stiffest, scene.poisson, scene.density, scene.damping, scene.damping_frequency));
+  for (const std::string& warning : outside_envelope(scene)) talk("warning: " + warning);
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -213,7 +232,8 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
     if (step.status != fem::SimulationStatus::Ok) fail(character, step, fmt::format("frame {}", number));
     const std::vector<Eigen::Affine3d> pose = character.pose(time);
     const Points surface = simulation.skin_of(simulation.positions_at(time));
-    const CharacterFrame frame = frame_at(character, pose, surface);
+    CharacterFrame frame = frame_at(character, pose, surface);
+    if (scene.offset) offset_from_skinning(character, body, pose, time, *scene.offset, frame);
     try {
       writer.write(layout.apply(frame.simulated));
     } catch (const std::domain_error& error) {

@@ -135,6 +135,7 @@ precision = "float"
 fps = 23.976
 frames = "3-47"
 settle = 0
+offset = 0.5
 threads = 2
 output_mesh = "hero.obj"
 
@@ -179,6 +180,7 @@ region = "trunk"
   expected.precision = Precision::Float;
   expected.fps = 23.976;
   expected.frames = FrameRange{3, 47};
+  expected.offset = 0.5;
   expected.settle = 0.0;
   expected.threads = 2;
   expected.output_mesh = "hero.obj";
@@ -230,7 +232,8 @@ TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
       {"frames = \"first\"",
        "scene.toml:1: frames: got 'first', expected A-B, two frame numbers; hint: 0-47"},
       {"integrator = \"bdf3\"",
-       "scene.toml:1: integrator: got 'bdf3', expected bdf2 or backward-euler; hint: bdf2"},
+       "scene.toml:1: integrator: got 'bdf3', expected bdf2, backward-euler, tr-bdf2 or implicit-midpoint; "
+       "hint: bdf2"},
       {"model = \"blendde\"",
        "scene.toml:1: model: got 'blendde', expected one of " + model_list() + "; hint: blended"},
       {"model = \"magic\"",
@@ -344,10 +347,11 @@ Scene random_scene(std::mt19937_64& rng) {
   scene.output_space = index(2) == 1 ? OutputSpace::Si : OutputSpace::File;
   scene.gravity = {unit(), -10.0 * unit(), 1e-7 * unit()};
   scene.step = 1e-6 + 0.09 * unit();
-  scene.integrator = index(2) == 1 ? Integrator::BackwardEuler : Integrator::Bdf2;
-  if (index(2) == 1) scene.model = "skin";
+  scene.integrator = static_cast<Integrator>(index(4));
+  if (index(2) == 1) scene.model = "neo-hookean";
   scene.precision = index(2) == 1 ? Precision::Float : Precision::Double;
   scene.fps = 1.0 + 100.0 * unit();
+  if (index(2) == 1) scene.offset = 10.0 * unit();
   if (index(2) == 1) scene.frames = FrameRange{index(10), 10 + index(10)};
   scene.settle = 10.0 * unit();
   scene.threads = index(64);
@@ -360,6 +364,15 @@ Scene random_scene(std::mt19937_64& rng) {
     if (!built && index(2) == 1) scene.materials.push_back({{}, 1e4, {}, {}, {}, {}, {}, {text(), "7"}});
   }
   return scene;
+}
+
+TEST_F(SceneFile, WarnsOfWhatIsOutsideOfTheTestedRange) {
+  EXPECT_TRUE(outside_envelope(Scene{}).empty());
+  Scene scene = read("step = 1e-6\nyoung = 1e3\n[[material]]\nbones = [\"a\"]\nyoung = 1e12\n");
+  EXPECT_EQ(outside_envelope(scene),
+            (std::vector<std::string>{
+                "step: got 1e-06 s, outside of 1e-05 ... 0.1, where every model is tested",
+                "material 1: young: got 1e+12 Pa, outside of 1000 ... 1e+09, where every model is tested"}));
 }
 
 TEST_F(SceneFile, ReadsBackExactlyWhatIsPrinted) {

@@ -100,6 +100,8 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
                              "0-47",
                              "--settle",
                              "0.5",
+                             "--offset",
+                             "0.25",
                              "--threads",
                              "3",
                              "--output-mesh",
@@ -125,6 +127,7 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
   EXPECT_EQ(scene.precision, Precision::Float);
   EXPECT_EQ(scene.frames, (FrameRange{0, 47}));
   EXPECT_EQ(scene.settle, 0.5);
+  EXPECT_EQ(scene.offset, 0.25);
   EXPECT_EQ(scene.threads, 3);
   EXPECT_EQ(scene.output_mesh, "a.obj");
   EXPECT_TRUE(scene.overwrite);
@@ -183,13 +186,23 @@ TEST(SimulateOptions, RefuseWithFlagValueRangeAndHint) {
       {"--threads", "10000", "--threads: got 10000, expected 0 <= threads <= 1024; hint: 0"},
       {"--frames", "7-3", "--frames: got 7-3, expected A-B with 0 <= A <= B <= 10000000; hint: 0-47"},
       {"--frames", "-3-7", "--frames: got -3-7, expected A-B with 0 <= A <= B <= 10000000; hint: 0-47"},
-      {"--integrator", "bfd2", "--integrator: got 'bfd2', expected bdf2 or backward-euler; hint: bdf2"},
+      {"--offset", "-1", "--offset: got -1, expected 0 <= offset <= 10; hint: 1"},
+      {"--integrator", "bfd2",
+       "--integrator: got 'bfd2', expected bdf2, backward-euler, tr-bdf2 or implicit-midpoint; hint: bdf2"},
       {"--model", "skni", "--model: got 'skni', expected one of " + model_list() + "; hint: skin"},
       {"--output-space", "metres", "--output-space: got 'metres', expected file or si; hint: file"},
   };
   for (const auto& [flag, value, message] : cases) {
     EXPECT_EQ(refusal({"hero.glb", "-o", "out", flag, value}), message) << flag << " " << value;
   }
+}
+
+TEST(SimulateOptions, RefuseAnIntegratorThatAModelHasNoUseFor) {
+  EXPECT_EQ(
+      refusal({"hero.glb", "-o", "out", "--model", "skin", "--integrator", "tr-bdf2"}),
+      "integrator: got tr-bdf2, expected nothing as the model skin stands where the pose puts it; hint: "
+      "leave it out");
+  EXPECT_EQ(refusal({"hero.glb", "-o", "out", "--model", "springs", "--integrator", "tr-bdf2"}), "accepted");
 }
 
 TEST(SimulateOptions, DemandARigAndAnOutputForARunOnly) {
