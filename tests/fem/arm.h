@@ -60,8 +60,9 @@ struct Arm {
   lattice::Surface skin;
 };
 
-/// `margin`: layers of cells round the flesh that hold none of it.
-inline Arm make_arm(lattice::CellType type = lattice::CellType::Hexahedron, int margin = 0) {
+/// `margin`: layers of cells round the flesh that hold none of it; `per_bone`: cells along each bone.
+inline Arm make_arm(lattice::CellType type = lattice::CellType::Hexahedron, int margin = 0,
+                    int per_bone = 5) {
   Arm arm;
   std::vector<skeleton::Joint> joints(3);
   const std::array<const char*, 3> names{"shoulder", "elbow", "wrist"};
@@ -75,14 +76,16 @@ inline Arm make_arm(lattice::CellType type = lattice::CellType::Hexahedron, int 
   }
   arm.skeleton = skeleton::Skeleton(joints);
 
-  // Ten cells of 0.1 along the bones and one more at each end; y and z are cut at the bones.
+  // As many cells along the bones as wanted and one more at each end; y and z are cut at the bones.
+  const double edge = 0.5 / per_bone;
   const double half = 0.12 * (1 + margin);
   const int across = 2 * (1 + margin);
-  const lattice::BoxOptions box{{-0.1, -half, -half}, {1.1, half, half}, {12, across, across}, type, {}};
+  const lattice::BoxOptions box{
+      {-edge, -half, -half}, {1.0 + edge, half, half}, {2 * per_bone + 2, across, across}, type, {}};
   arm.lattice.complex = lattice::box_lattice(box);
-  arm.lattice.edge_length = 0.12;
+  arm.lattice.edge_length = std::max(0.12, edge);
   arm.lattice.frame_of_joint = {0, 1, 1};
-  const auto vertex = [&](int i) { return i + 13 * (1 + margin) * (across + 2); };
+  const auto vertex = [&](int i) { return i + (2 * per_bone + 3) * (1 + margin) * (across + 2); };
   for (int b = 0; b < 2; ++b) {
     lattice::LatticeBone bone;
     bone.name = b == 0 ? "upper" : "lower";
@@ -91,7 +94,7 @@ inline Arm make_arm(lattice::CellType type = lattice::CellType::Hexahedron, int 
     bone.rest_end = {0.5 * (b + 1), 0.0, 0.0};
     bone.start = {b, b + 1, bone.rest_start, bone.rest_end};
     bone.end = bone.start;
-    for (int i = 0; i <= 5; ++i) bone.chain.push_back(vertex(1 + 5 * b + i));
+    for (int i = 0; i <= per_bone; ++i) bone.chain.push_back(vertex(1 + per_bone * b + i));
     arm.lattice.bones.push_back(bone);
   }
   lattice::validate(arm.lattice);
