@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "assets/figure.h"
+#include "fem/models/model.h"
 #include "tests/tools/simulate_run.h"
 #include "tools/ladder_report.h"
 
@@ -171,6 +172,28 @@ TEST_F(LadderCommand, RunsTheGridOnceAndChoosesARunForATolerance) {
   const tests::Outcome chosen = tests::run(
       tests::command_line("simulate " + tests::quoted(out("ladder") / "chosen.toml") + " --preview off"));
   EXPECT_EQ(chosen.exit_code, 0) << chosen.text;
+}
+
+TEST_F(LadderCommand, RunsEveryRungAndTakesTheHighestAsReference) {
+  const tests::Outcome outcome =
+      ladder(scene() + " --levels 0,1 --steps 1/60,1/30 --frames 0-2 -o " + tests::quoted(out("ladder")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.text;
+  EXPECT_THAT(outcome.text, HasSubstr("reference: neo-hookean, level 1, 1/60 s"));
+  const auto json = nlohmann::json::parse(tests::read(out("ladder") / "ladder.json"));
+  ASSERT_EQ(json["runs"].size(), 4u * fem::models().size());
+  EXPECT_EQ(json["neighbours"].size(), 2u);
+  const std::string html = tests::read(out("ladder") / "ladder.html");
+  for (std::size_t k = 0; k < json["runs"].size(); ++k) {
+    const auto& run = json["runs"][k];
+    const std::string rung(fem::models()[k / 4].name);
+    EXPECT_EQ(run["rung"], rung);
+    EXPECT_TRUE(fs::exists(fs::path(run["folder"].get<std::string>()) / "skin.pc2")) << rung;
+    EXPECT_THAT(html, HasSubstr(rung));
+  }
+  // The bar is linear at this bend of 20 degrees, and its bones alone move it by 17 cm: whatever the rung,
+  // the same within a tenth of that; `skin`, which has no inertia, is 2.5 cm away.
+  for (const auto& run : json["runs"])
+    EXPECT_LT(run["rms_m"].get<double>(), run["rung"] == "skin" ? 0.03 : 0.02) << run["rung"];
 }
 
 TEST_F(LadderCommand, RunsAgainWhereTheSceneHasChanged) {
