@@ -369,7 +369,8 @@ class Judge {
             is_separated(complex_, with, complex_.cells[c], layer))
           continue;
         // Rounded coordinates: a layer that thick over the largest section of what they can have in common.
-        const Vector3d size = common.sizes();
+        // Never less than rounding itself: cells that share a vertex have a point in common.
+        const Vector3d size = common.sizes().cwiseMax(same_place_);
         const double section = std::max({size.x() * size.y(), size.y() * size.z(), size.z() * size.x()});
         const double volume = detail::overlap_volume(complex_, complex_.cells[c], with);
         if (!(volume > 2.0 * same_place_ * section)) continue;
