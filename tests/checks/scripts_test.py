@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What tools/quickstart, tools/test and .ci/run say and call, with the programs they call replaced by recorders."""
+"""What tools/quickstart, tools/test, tools/tables and .ci/run say and call, with the programs they call replaced by recorders."""
 
 import os
 import shutil
@@ -24,7 +24,8 @@ class Scripts(unittest.TestCase):
         self.programs = os.path.join(self.folder, "bin")
         self.calls_file = os.path.join(self.folder, "calls")
         os.makedirs(self.programs)
-        for name in ("tools/quickstart", "tools/test", "tools/setup.bash", "tools/packages.txt", ".ci/run"):
+        for name in ("tools/quickstart", "tools/test", "tools/tables", "tools/setup.bash", "tools/packages.txt",
+                     ".ci/run"):
             os.makedirs(os.path.dirname(os.path.join(self.root, name)), exist_ok=True)
             shutil.copy(os.path.join(SOURCE, name), os.path.join(self.root, name))
         for name in ("cmake", "ctest", "apt-get"):
@@ -120,6 +121,60 @@ class Scripts(unittest.TestCase):
         self.assertEqual(self.run_script(".ci/run").returncode, 0)
         self.assertEqual(self.called("ctest")[0].split(" ")[1:3], ["--test-dir", "build/ci"])
         self.assertTrue(self.called("ctest")[0].endswith("--label-exclude ^(bench|nightly)$"))
+
+    def readme(self, text=None):
+        path = os.path.join(self.root, "README.md")
+        if text is not None:
+            with open(path, "w", encoding="utf-8") as stream:
+                stream.write(text)
+        with open(path, encoding="utf-8") as stream:
+            return stream.read()
+
+    def bench(self, name, body):
+        self.program(name, body, os.path.join(self.root, "build/release/tools"))
+
+    def test_tables_are_replaced_between_their_marks(self):
+        old = "a\n\n<!-- table {} -->\n\n| old |\n\n<!-- /table -->\n\nb\n"
+        self.readme(old.format("oracle") + old.format("models"))
+        self.bench("oracle_bench", "echo '| new |'")
+        result = self.run_script("tools/tables", "--only", "oracle")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertEqual(self.readme(), old.format("oracle").replace("old", "new") + old.format("models"))
+        self.assertIn("cmake --build --preset release --target oracle_bench", self.called("cmake"))
+
+    def test_tables_hold_what_tests_kept(self):
+        self.readme("<!-- table bar -->\n\n<!-- /table -->\n")
+        values = [f"sag_{level}" for level in (1, 2, 3)] + ["release_1", "release_2"]
+        values += [f"mode_{level}_{mode}" for level in (1, 2) for mode in range(6)]
+        kept = "".join(f'<property name="{name}" value="of {name}"/>' for name in values)
+        self.bench("fem_reference_test", f"echo '{kept}' >\"${{2#--gtest_output=xml:}}\"")
+        result = self.run_script("tools/tables", "--only", "bar")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertIn("| sag under its weight | of sag_1 % | of sag_2 % | of sag_3 % |", self.readme())
+
+    def test_tables_are_all_made_or_none_is_written(self):
+        text = "<!-- table oracle -->\n\n<!-- /table -->\n<!-- table bar -->\n\n<!-- /table -->\n"
+        self.readme(text)
+        self.bench("oracle_bench", "echo '| new |'")
+        self.bench("fem_reference_test", "exit 1")
+        result = self.run_script("tools/tables", "--only", "oracle,bar")
+        self.assertEqual(result.returncode, 1)
+        self.assertTrue(result.stderr.startswith("tables: ") and result.stderr.count("\n") == 1, result.stderr)
+        self.assertIn("fem_reference_test failed with exit code 1", result.stderr)
+        self.bench("fem_reference_test", 'echo >"${2#--gtest_output=xml:}"')
+        result = self.run_script("tools/tables", "--only", "oracle,bar")
+        self.assertEqual((result.returncode, result.stderr), (1, "tables: table bar: no test kept 'sag_1'\n"))
+        self.assertEqual(self.readme(), text)
+
+    def test_tables_refuse_a_table_that_is_not(self):
+        result = self.run_script("tools/tables", "--only", "speed")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("--only: got speed, expected models, oracle,", result.stderr)
+        self.readme("no marks\n")
+        self.bench("oracle_bench", "echo '| new |'")
+        result = self.run_script("tools/tables", "--only", "oracle")
+        self.assertEqual((result.returncode, result.stderr),
+                         (1, "tables: README.md: expected one pair <!-- table oracle --> ... <!-- /table -->\n"))
 
     def test_no_install_names_what_is_missing(self):
         self.installed('[[ $* == *" libfmt-dev" || $* == *" cmake" ]] || echo installed')

@@ -10,6 +10,7 @@
 
 #include "fem/simulation.h"
 #include "tests/fem/bar.h"
+#include "tests/publish.h"
 
 namespace sinew::fem {
 namespace {
@@ -62,6 +63,7 @@ TEST(ReferenceBar, SagConvergesToTheIndependentAnswer) {
   double previous = 100.0;
   for (int levels = 1; levels <= 3; ++levels) {
     const double error = -percent(tests::tip_sag(bar_at(levels, 0.3)), kExact);
+    tests::publish("sag_" + std::to_string(levels), "%.2f", -error);
     EXPECT_LT(error, bound[static_cast<std::size_t>(levels - 1)]);
     EXPECT_LT(error, 0.6 * previous);
     EXPECT_GT(error, -100.0 * kBand / 3.766);  // conforming and fully integrated: never too soft
@@ -105,6 +107,8 @@ TEST(ReferenceBar, ClampedFrequenciesConverge) {
   const std::vector<double> coarse = tests::natural_frequencies(bar_at(1, 0.3), 6),
                             fine = tests::natural_frequencies(bar_at(2, 0.3), 6);
   for (std::size_t m = 0; m < 6; ++m) {
+    tests::publish("mode_1_" + std::to_string(m), "%+.1f", percent(coarse[m], exact[m]));
+    tests::publish("mode_2_" + std::to_string(m), "%+.1f", percent(fine[m], exact[m]));
     EXPECT_LT(percent(coarse[m], exact[m]), bound[m]) << "mode " << m;
     EXPECT_LT(percent(fine[m], exact[m]), 0.5 * percent(coarse[m], exact[m])) << "mode " << m;
     EXPECT_GT(percent(fine[m], exact[m]), -0.01) << "mode " << m;  // Rayleigh: from above
@@ -157,6 +161,10 @@ TEST(ReferenceBar, TransientFollowsTheModalSolutionAndConverges) {
   for (bool damped : {false, true}) {
     const double coarse = transient_error(1, damped, Integrator::Bdf2);
     const double fine = transient_error(2, damped, Integrator::Bdf2);
+    if (!damped) {
+      tests::publish("release_1", "%.2f", coarse);
+      tests::publish("release_2", "%.2f", fine);
+    }
     EXPECT_LT(coarse, 2.0);
     EXPECT_LT(fine, 0.5 * coarse);
     EXPECT_LT(transient_error(2, damped, Integrator::BackwardEuler), fine + 1.0);
