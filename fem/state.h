@@ -26,7 +26,8 @@ struct StagePoses {
   const PosedFrames* stage = nullptr;   ///< at the stage's time.
 };
 
-/// Which functions a region's system is written in; both span the same space on uniform levels.
+/// Which functions a region's system is written in; both span the same space. The nodal one is taken only
+/// where every leaf vertex is active.
 enum class Basis { Hierarchical, Nodal };
 
 struct SolverOptions {

@@ -1,5 +1,7 @@
 #include "fem/detail/coordinates.h"
 
+#include <algorithm>
+
 namespace sinew::fem::detail {
 
 void Coordinates::analyse(const lattice::Points& from, lattice::Points& to) const {
@@ -34,6 +36,12 @@ Coordinates hierarchical_coordinates(const Body& body) {
 }
 
 Coordinates nodal_coordinates(const Body& body) {
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    const auto i = static_cast<std::size_t>(a);
+    if (!body.bones.is_bone[i] &&
+        !std::binary_search(body.mesh.functions.begin(), body.mesh.functions.end(), body.mesh.vertices[i]))
+      return hierarchical_coordinates(body);
+  }
   Coordinates c;
   const int n = body.mesh.num_vertices();
   c.values.resize(n, n);

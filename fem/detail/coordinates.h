@@ -27,7 +27,9 @@ struct Coordinates {
 /// The hierarchical basis: right for every active set.
 Coordinates hierarchical_coordinates(const Body& body);
 
-/// Hats of the leaf vertices: right only where every leaf vertex but those on bones is active.
+/// Hats of the leaf vertices, which span the active functions' space where every leaf vertex but those on
+/// bones is active; elsewhere (also on level 0 alone, whose leaf cells have vertices of level 1) the
+/// hierarchical basis.
 Coordinates nodal_coordinates(const Body& body);
 
 }  // namespace sinew::fem::detail
