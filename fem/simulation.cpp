@@ -225,7 +225,10 @@ StageProblem Simulation::stage(const State& from, const Points& x_h, const Point
   problem.h = h;
   problem.integrator = options_.integrator;
   problem.gravity = options_.gravity;
-  if (!options_.loads.empty()) force_ = loads_.at(from.x);
+  // What follows the surface is taken where that will be at the end of the stage: of second order, like the
+  // rest.
+  if (!options_.loads.empty())
+    force_ = loads_.at(loads_.follow() ? Points(from.x + elapsed * from.v) : from.x);
   if (options_.force) {
     const Points further = options_.force(time);
     force_ = options_.loads.empty() ? further : Points(force_ + further);
