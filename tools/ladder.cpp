@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "assets/atomic_output.h"
 #include "assets/error.h"
 #include "assets/result.h"
 #include "fem/models/model.h"
@@ -87,17 +88,24 @@ LadderRun do_run(const Scene& scene, const std::string& folder, const Talk& talk
   run.folder =
       (fs::path(folder) / fmt::format("{}-l{}-s{}-{}", scene.model, scene.levels, step, settings_hash(scene)))
           .string();
-  run.reused = fs::exists(fs::path(run.folder) / "report.json");
+  const std::string failure_file = (fs::path(run.folder) / "failure.txt").string();
+  run.reused = fs::exists(fs::path(run.folder) / "report.json") || fs::exists(failure_file);
+  if (run.reused && fs::exists(failure_file)) run.failure = read_file(failure_file);
   if (!run.reused) {
     Scene with_output = scene;
     with_output.output = run.folder;
     try {
       simulate(with_output, [](const std::string&) {});
     } catch (const NumericalError& error) {
+      // The same settings fail again: so the ladder keeps this answer as it keeps others.
       run.failure = error.what();
-      talk(fmt::format("{}: failed: {}", run.name(), run.failure));
-      return run;
+      fs::create_directories(run.folder);
+      assets::write_file(failure_file, run.failure, assets::Overwrite::Replace);
     }
+  }
+  if (!run.ok()) {
+    talk(fmt::format("{}: failed: {}{}", run.name(), run.failure, run.reused ? " (was there)" : ""));
+    return run;
   }
   read_costs(run);
   talk(fmt::format("{}: {:.3g} ms per frame{}", run.name(), 1e3 * run.per_frame,
@@ -205,12 +213,16 @@ Ladder run_ladder(const Scene& scene, const LadderGrid& grid, double limit, cons
   settings_hash(scene);  // names a file that cannot be read before anything is written
   const std::string runs = (fs::path(folder) / "runs").string();
   fs::create_directories(runs);
+  const std::size_t total = grid.rungs.size() * grid.levels.size() * grid.steps.size();
   for (const std::string& rung : grid.rungs) {
     for (const int level : grid.levels) {
       for (const double step : grid.steps) {
         stop_if_interrupted(
             fmt::format("after {} runs of the ladder; the same command goes on", ladder.runs.size()));
-        ladder.runs.push_back(do_run(scene_of_run(scene, rung, level, step), runs, talk));
+        const auto numbered = [&](const std::string& line) {
+          talk(fmt::format("[{}/{}] {}", ladder.runs.size() + 1, total, line));
+        };
+        ladder.runs.push_back(do_run(scene_of_run(scene, rung, level, step), runs, numbered));
       }
     }
   }

@@ -18,6 +18,7 @@ namespace sinew::tools {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -202,6 +203,34 @@ TEST_F(LadderCommand, RunsAgainWhereTheSceneHasChanged) {
   EXPECT_EQ(ladder(file + arguments).exit_code, 0);
   EXPECT_THAT(ladder(file + arguments).text, HasSubstr("was there"));
   EXPECT_THAT(ladder(file + arguments + " --frames 0-2").text, Not(HasSubstr("was there")));
+}
+
+// Flesh that is squeezed to nothing is beyond StVK's law. That is an answer too: it is kept and not sought
+// again.
+TEST_F(LadderCommand, KeepsWhatFailedAndRunsTheRest) {
+  const fs::path path = out("crushed.toml");
+  std::ofstream(path)
+      << "young = 5e4\nframes = \"0-6\"\nsettle = 0.1\n[lattice]\nbox = [1, 0.2, 0.2]\ncells = [4, 1, 1]\n"
+         "[[bone]]\nname = \"anvil\"\nstart = [0, 0, 0]\nend = [0.25, 0, 0]\n"
+         "[[bone]]\nname = \"press\"\nstart = [1, 0, 0]\nend = [0.75, 0, 0]\n"
+         "keys = [{ time = 0 }, { time = 0.2, move = [-0.6, 0, 0] }]\n"
+         "[[point_load]]\nat = [0.5, 0.2, 0.1]\nforce = [0, -0.2, 0]\n"
+         "[[face_load]]\nface = \"z-max\"\npressure = 100\n";
+  const std::string arguments = tests::quoted(path) +
+                                " --rungs stvk,neo-hookean --levels 1 --steps 1/60,1/120 -o " +
+                                tests::quoted(out("ladder"));
+  const tests::Outcome first = ladder(arguments);
+  ASSERT_EQ(first.exit_code, 0) << first.text;
+  EXPECT_THAT(first.text,
+              ContainsRegex("stvk, level 1, 1/60 s: failed: .*crushed.toml: frame [0-9]: stvk: collapsed"));
+  EXPECT_THAT(first.text, HasSubstr("reference: neo-hookean, level 1, 1/120 s"));
+  const auto json = nlohmann::json::parse(tests::read(out("ladder") / "ladder.json"));
+  EXPECT_THAT(json["runs"][0]["failure"].get<std::string>(), HasSubstr("leaf cell"));
+  EXPECT_GT(json["runs"][2]["rms_m"].get<double>(), 0.0);
+  const tests::Outcome again = ladder(arguments);
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_THAT(again.text, HasSubstr(json["runs"][0]["failure"].get<std::string>() + " (was there)"));
+  EXPECT_EQ(nlohmann::json::parse(tests::read(out("ladder") / "ladder.json")), json);
 }
 
 TEST_F(LadderCommand, SaysWhatIsWrongWithItsFlags) {

@@ -33,8 +33,7 @@ TEST(Oracle, TheRungsStayWithinHalfOfTheirGoalsAtSixtyDegrees) {
   expect_goals(60.0, {{"blended", 1.5}, {"blended-stiffness", 1.0}, {"corotational", 0.5}});
 }
 
-// Every bundled sample in motion: rungs may not come closer in another order than they cost. Measured over 12
-// frames of the hop.
+// Measured over these six frames 0.58, 0.20, 0.10 and 0.08 % of the height.
 TEST(Oracle, DearerRungsAreNearerToNeoHookeanFleshInAHop) {
   const OracleSample hop(sample_scene("hopper", "", 200));
   const Frames exact = moving(hop, "neo-hookean", 6);
