@@ -271,11 +271,19 @@ SolveReport Simulation::midpoint_step(double h, const PosedFrames& next, State& 
   // arcs instead, bones have the velocity of the step's first quarter, and the rule is of first order.
   const std::optional<PosedFrames> middle = mean_pose(body_.tree, now_, next);
   if (!middle) return stage_without_history(h, h, next, after);
-  // Flesh that only moves with its frames has no rate of strain, though a chord is shorter than its arc.
-  const Points carried_x = carried(body_, state_.x, now_, *middle);
+  // The rate of strain is that of the whole step, (u_n+1 - u_n) / h with each u in its own frames, but for
+  // what the prediction of x_n+1 lacks, which is taken at the middle. Flesh that only moves with its frames
+  // has none.
+  const Points to_next = carried(body_, state_.x, now_, next);
+  const Points since = has_before_ && last_h_ == h ? carried(body_, state_.x, now_, past_) : state_.x;
+  const double span = has_before_ && last_h_ == h ? 2.0 * h : h;
+  Points end = to_next + h * (state_.v - (to_next - since) / span);
+  place_bones(body_, next, end);
+  fill_inactive_leaves(body_, end);
+  const Points half_way = 0.5 * (state_.x + end);
   StageProblem problem =
       stage(state_, state_.x, state_.v, {before_pose(), &now_, &*middle}, 0.5 * h, h, middle->time);
-  problem.past = {{1.0, &carried_x, &*middle}};
+  problem.past = {{1.0, &half_way, &*middle}, {0.5, &state_.x, &now_}, {-0.5, &end, &next}};
   Points v;
   const SolveReport solve = model_->solve_stage(problem, v);
   if (!solve.ok()) return solve;
