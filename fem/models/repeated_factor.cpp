@@ -6,6 +6,7 @@
 #include <cholmod.h>
 
 #include "fem/detail/cholmod_alone.h"
+#include "fem/detail/packed_factor.h"
 
 namespace sinew::fem {
 
@@ -13,9 +14,12 @@ struct RepeatedFactor::Impl {
   mutable cholmod_common common;
   cholmod_factor* factor = nullptr;
   bool ok = false;
+  FactorUse use;
+  detail::PackedFactor packed;  ///< of a preconditioner.
+  mutable Eigen::VectorXd workspace;
   mutable cholmod_dense *solution = nullptr, *y = nullptr, *e = nullptr;  ///< CHOLMOD's own workspace.
 
-  Impl() {
+  explicit Impl(FactorUse what_for) : use(what_for) {
     detail::start_supernodal(common);
     common.quick_return_if_not_posdef = true;
   }
@@ -30,7 +34,7 @@ struct RepeatedFactor::Impl {
   Impl& operator=(const Impl&) = delete;
 };
 
-RepeatedFactor::RepeatedFactor() : impl_(std::make_unique<Impl>()) {}
+RepeatedFactor::RepeatedFactor(FactorUse use) : impl_(std::make_unique<Impl>(use)) {}
 RepeatedFactor::~RepeatedFactor() = default;
 RepeatedFactor::RepeatedFactor(RepeatedFactor&&) noexcept = default;
 RepeatedFactor& RepeatedFactor::operator=(RepeatedFactor&&) noexcept = default;
@@ -42,7 +46,13 @@ Factor::Report RepeatedFactor::factorise(const Eigen::SparseMatrix<double>& lowe
   Impl& f = *impl_;
   f.ok = false;
   Factor::Report report;
-  cholmod_sparse view = detail::view_lower(lower);
+  Eigen::SparseMatrix<double> scaled;
+  Eigen::VectorXd scale;
+  if (f.use == FactorUse::Preconditioner) {
+    scale = detail::jacobi_scale(lower.diagonal());
+    scaled = scale.asDiagonal() * lower * scale.asDiagonal();
+  }
+  cholmod_sparse view = detail::view_lower(f.use == FactorUse::Preconditioner ? scaled : lower);
   const detail::CholmodAlone alone;
   if (f.factor == nullptr) f.factor = cholmod_analyze(&view, &f.common);
   if (f.factor == nullptr) return {false, 0, "out of memory in the symbolic analysis"};
@@ -53,12 +63,14 @@ Factor::Report RepeatedFactor::factorise(const Eigen::SparseMatrix<double>& lowe
     return {false, pivot, "the matrix is not positive definite at row " + std::to_string(pivot)};
   }
   if (f.common.status < CHOLMOD_OK) return {false, 0, "out of memory in the factorisation"};
+  if (f.use == FactorUse::Preconditioner) f.packed = detail::PackedFactor(*f.factor, scale, Precision::Float);
   f.ok = report.ok = true;
   return report;
 }
 
 void RepeatedFactor::solve(Eigen::Ref<Eigen::VectorXd> b) const {
   const Impl& f = *impl_;
+  if (f.use == FactorUse::Preconditioner) return f.packed.solve(b, f.workspace);
   cholmod_dense right{};
   right.nrow = right.d = static_cast<std::size_t>(b.size());
   right.ncol = 1;

@@ -130,6 +130,21 @@ Eigen::VectorXd solve_ones_repeatedly(const Eigen::SparseMatrix<double>& matrix)
   return x;
 }
 
+// A preconditioner solves from floats: rounding of 6e-8 times the condition of this matrix, below 30.
+TEST(RepeatedFactor, SolvesAsAPreconditionerToTheAccuracyOfFloats) {
+  Eigen::SparseMatrix<double> matrix = grid_matrix(12);
+  fem::RepeatedFactor factor(fem::FactorUse::Preconditioner);
+  for (double scale : {1.0, 1e-90}) {  // a pattern again, with numbers beyond floats
+    matrix *= scale;
+    ASSERT_TRUE(factor.factorise(Eigen::SparseMatrix<double>(matrix.triangularView<Eigen::Lower>())).ok);
+    Eigen::VectorXd x = Eigen::VectorXd::Ones(matrix.rows());
+    factor.solve(x);
+    const double left = (matrix * x - Eigen::VectorXd::Ones(matrix.rows())).norm() / std::sqrt(matrix.rows());
+    EXPECT_LE(left, 2e-6);
+    EXPECT_GE(left, 1e-9);  // not in doubles
+  }
+}
+
 // METIS draws its random numbers from the C library's one generator, which threads that order at the same
 // time would share. Several matrices of several sizes, as regions are, and both kinds of factor side by side;
 // many rounds, as the clash is a matter of chance.
