@@ -113,27 +113,22 @@ Balance rest_balance(const Body& body, const PoseProblem& problem, const Points&
   return b;
 }
 
-Points outer_forces(const Body& body, const Balance& b, const Points& x) {
+OuterForces outer_forces(const Body& body, const Balance& b, const Points& x) {
   const LeafMatrices& m = body.matrices;
-  Points forces = b.load + b.tie_target;
+  Points ties = b.tie_target, inertia = Points::Zero(x.rows(), 3);
   const bool moving = b.inertia > 0.0;
   over_vertices(body, [&](int a) {
     const auto i = static_cast<std::size_t>(a);
-    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    Eigen::RowVector3d tied = Eigen::RowVector3d::Zero(), carried = Eigen::RowVector3d::Zero();
     for (auto e = static_cast<std::size_t>(m.row_start[i]); e < static_cast<std::size_t>(m.row_start[i + 1]);
          ++e) {
-      sum -= m.tie[e] * x.row(m.column[e]);
-      if (moving) sum += (b.inertia * m.mass[e]) * (b.target.row(m.column[e]) - x.row(m.column[e]));
+      tied += m.tie[e] * x.row(m.column[e]);
+      if (moving) carried += m.mass[e] * (b.target.row(m.column[e]) - x.row(m.column[e]));
     }
-    forces.row(a) += sum;
+    ties.row(a) -= tied;
+    inertia.row(a) = b.inertia * carried;
   });
-  return forces;
-}
-
-double force_scale(const Body& body, const Balance& b, const Points& x) {
-  double scale = b.load.norm() + (b.tie_target - apply_tie(body.matrices, x)).norm();
-  if (b.inertia > 0.0) scale += b.inertia * apply_mass(body.matrices, b.target - x).norm();
-  return scale;
+  return {b.load + ties + inertia, b.load.norm() + ties.norm() + inertia.norm()};
 }
 
 CellSum::CellSum(const Body& body) {

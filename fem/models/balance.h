@@ -27,11 +27,12 @@ Balance stage_balance(const Body& body, const StageProblem& problem);
 /// At rest; `guess` as it comes, with bone vertices put on the pose.
 Balance rest_balance(const Body& body, const PoseProblem& problem, const lattice::Points& guess);
 
-/// inertia M (target - x) + ties + load; num_vertices x 3 [N].
-lattice::Points outer_forces(const Body& body, const Balance& balance, const lattice::Points& x);
-
-/// Sum of the norms of the forces that outer_forces adds up: what residuals are compared with.
-double force_scale(const Body& body, const Balance& balance, const lattice::Points& x);
+/// inertia M (target - x) + ties + load.
+struct OuterForces {
+  lattice::Points sum;  ///< num_vertices x 3 [N].
+  double scale = 0.0;   ///< sum of the norms of the three: what residuals are compared with [N].
+};
+OuterForces outer_forces(const Body& body, const Balance& balance, const lattice::Points& x);
 
 /// Sums of cell vectors at the leaf vertices, in the order of the cells.
 class CellSum {

@@ -154,13 +154,14 @@ Factor::Report NewtonModel::factorise(const Balance& balance, const Points& x) {
 SolveReport NewtonModel::solve(const Balance& balance, double tolerance, Points& x) {
   energy_->set_damping(balance.damping, balance.past);
   SolveReport report;
-  Points outer = outer_forces(body_, balance, x), elastic = elastic_forces(x);
+  OuterForces outer = outer_forces(body_, balance, x);
+  Points elastic = elastic_forces(x);
   double energy = elastic_energy(x);
-  Points residual = free_.gather(outer - elastic);
+  Points residual = free_.gather(outer.sum - elastic);
   const double extent = x.rowwise().norm().maxCoeff();
   double rounding = 0.0;  ///< what is left of a residual that is zero.
   for (; report.iterations < options_.max_iterations; ++report.iterations) {
-    const double scale = force_scale(body_, balance, x) + elastic.norm();
+    const double scale = outer.scale + elastic.norm();
     report.residual = residual.norm() / std::max(scale, std::numeric_limits<double>::min());
     if (!std::isfinite(report.residual)) break;
     if (residual.norm() <= tolerance * scale + rounding) return report;
@@ -183,11 +184,11 @@ SolveReport NewtonModel::solve(const Balance& balance, double tolerance, Points&
     bool accepted = false;
     for (int k = 0; k < 30; ++k, length *= 0.5) {
       const Points tried = x + length * leaf_step;
-      const Points tried_outer = outer_forces(body_, balance, tried);
+      const OuterForces tried_outer = outer_forces(body_, balance, tried);
       const double tried_energy = elastic_energy(tried);
       // The outer forces are linear in x: their potential's change is exact as a mean.
       const double change =
-          tried_energy - energy - 0.5 * length * (outer + tried_outer).cwiseProduct(leaf_step).sum();
+          tried_energy - energy - 0.5 * length * (outer.sum + tried_outer.sum).cwiseProduct(leaf_step).sum();
       const double noise = 1e-13 * (std::abs(energy) + std::abs(tried_energy));
       if (!(change <= 1e-4 * length * slope + noise)) continue;
       x = tried;
@@ -199,7 +200,7 @@ SolveReport NewtonModel::solve(const Balance& balance, double tolerance, Points&
     if (!accepted) break;
     if (length * leaf_step.cwiseAbs().maxCoeff() <= 1e-15 * extent) return report;  // nothing moves any more
     elastic = elastic_forces(x);
-    residual = free_.gather(outer - elastic);
+    residual = free_.gather(outer.sum - elastic);
   }
   report.status = SolveStatus::NoConvergence;
   report.message = fmt::format("{}: no balance of forces after {} iterations, residual {:.2g} of the forces",

@@ -1,14 +1,17 @@
 #include "fem/models/rotated_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "fem/detail/turned_cells.h"
 #include "fem/models/balance.h"
 #include "fem/models/free_system.h"
 #include "fem/models/repeated_factor.h"
@@ -29,9 +32,7 @@ class RotatedModel final : public Model {
         cells_(body),
         free_(free_vertices(body)),
         system_(body, free_),
-        cell_sum_(body),
-        matrices_(body.mesh.cells.size()),
-        forces_(body.mesh.cells.size()) {}
+        factor_(FactorUse::Preconditioner) {}
 
   SolveReport prepare(double, Integrator) override { return {}; }
 
@@ -62,6 +63,7 @@ class RotatedModel final : public Model {
 
  private:
   Points residual_of(const Balance& balance, const Rotations& rotations, const Points& x);
+  Points apply(const Balance& balance, const Rotations& rotations, const Points& dx);
   SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
                       double tolerance, Points& x);
   bool refactor(const Balance& balance, const Rotations& rotations, SolveReport& report);
@@ -75,10 +77,8 @@ class RotatedModel final : public Model {
   RotatedStiffness cells_;
   FreeVertices free_;
   BlockSystem system_;
-  CellSum cell_sum_;
-  std::vector<CellStiffness> matrices_;
-  std::vector<CellVector> forces_;
-  double scale_ = 0.0;  ///< of the forces at the last residual.
+  std::vector<double> corner_forces_;  ///< a buffer.
+  double scale_ = 0.0;                 ///< of the forces at the last residual.
 
   RepeatedFactor factor_;
   double factor_inertia_ = -1.0, factor_damping_ = -1.0;
@@ -88,23 +88,51 @@ class RotatedModel final : public Model {
 /// Forces left over at the unknowns.
 Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations, const Points& x) {
   std::vector<Rotations> past;
+  std::vector<detail::TurnedPlace> places{{1.0 + balance.damping, &x, &rotations},
+                                          {-1.0, &body_.mesh.points}};
   if (balance.damping > 0.0) {
-    for (const PastPlace& place : balance.past) past.push_back(rotations_(*place.x, *place.pose));
+    past.reserve(balance.past.size());
+    for (const PastPlace& place : balance.past) {
+      past.push_back(rotations_(*place.x, *place.pose));
+      places.push_back({-balance.damping * place.share, place.x, &past.back()});
+    }
   }
-  tbb::parallel_for(std::size_t{0}, forces_.size(), [&](std::size_t c) {
-    const int cell = static_cast<int>(c);
-    CellVector u = (1.0 + balance.damping) * cells_.displacement(cell, rotations[c], x);
-    for (std::size_t k = 0; k < past.size(); ++k)
-      u -=
-          balance.damping * balance.past[k].share * cells_.displacement(cell, past[k][c], *balance.past[k].x);
-    forces_[c] = turned(rotations[c], cells_.stiffness(cell) * u);
-  });
-  const Points elastic = cell_sum_(forces_);
-  scale_ = force_scale(body_, balance, x) + elastic.norm();
-  return free_.gather(outer_forces(body_, balance, x) - elastic);
+  cells_.cells().forces(rotations, places, corner_forces_);
+  Points elastic(x.rows(), 3);
+  for (int a = 0; a < body_.mesh.num_vertices(); ++a)
+    elastic.row(a) = cells_.cells().groups().sum_at(a, corner_forces_).transpose();
+  const OuterForces outer = outer_forces(body_, balance, x);
+  scale_ = outer.scale + elastic.norm();
+  return free_.gather(outer.sum - elastic);
+}
+
+/// A dx at the unknowns.
+Points RotatedModel::apply(const Balance& balance, const Rotations& rotations, const Points& dx) {
+  const Points leaves = free_.spread(dx);
+  const std::array<detail::TurnedPlace, 1> place{{{1.0 + balance.damping, &leaves, &rotations}}};
+  cells_.cells().forces(rotations, place, corner_forces_);
+  const LeafMatrices& m = body_.matrices;
+  Points forces(leaves.rows(), 3);
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, m.num_vertices(), 128), [&](const tbb::blocked_range<int>& range) {
+        for (int a = range.begin(); a != range.end(); ++a) {
+          const auto i = static_cast<std::size_t>(a);
+          Eigen::Vector3d sum = cells_.cells().groups().sum_at(a, corner_forces_);
+          for (auto e = static_cast<std::size_t>(m.row_start[i]);
+               e < static_cast<std::size_t>(m.row_start[i + 1]); ++e)
+            sum += (balance.inertia * m.mass[e] + m.tie[e]) * leaves.row(m.column[e]).transpose();
+          forces.row(a) = sum.transpose();
+        }
+      });
+  return free_.gather(forces);
 }
 
 bool RotatedModel::refactor(const Balance& balance, const Rotations& rotations, SolveReport& report) {
+  std::vector<CellStiffness> matrices(rotations.size());
+  tbb::parallel_for(std::size_t{0}, matrices.size(), [&](std::size_t c) {
+    matrices[c] = (1.0 + balance.damping) * cells_.rotated(static_cast<int>(c), rotations[c]);
+  });
+  system_.assemble(balance.inertia, 1.0, matrices);
   const Factor::Report factor = factor_.factorise(system_.lower());
   if (!factor.ok) {
     report.status = SolveStatus::NotPositiveDefinite;
@@ -153,10 +181,6 @@ void RotatedModel::precondition(const std::vector<Eigen::Matrix3d>& turns, const
 SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotations, const Points& residual,
                                   double tolerance, Points& x) {
   SolveReport report;
-  tbb::parallel_for(std::size_t{0}, matrices_.size(), [&](std::size_t c) {
-    matrices_[c] = (1.0 + balance.damping) * cells_.rotated(static_cast<int>(c), rotations[c]);
-  });
-  system_.assemble(balance.inertia, 1.0, matrices_);
   const bool other = factor_inertia_ != balance.inertia || factor_damping_ != balance.damping;
   if ((other || !factor_.ok()) && !refactor(balance, rotations, report)) return report;
 
@@ -183,7 +207,7 @@ SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotat
     }
     direction = since_factor == 0 ? z : Points(z + next / rz * direction);
     rz = next;
-    system_.apply(direction, image);
+    image = apply(balance, rotations, direction);
     const double length = rz / direction.cwiseProduct(image).sum();
     dx += length * direction;
     r -= length * image;

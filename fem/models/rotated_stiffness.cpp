@@ -1,8 +1,10 @@
 #include "fem/models/rotated_stiffness.h"
 
-#include <cmath>
+#include <array>
 
 #include <tbb/parallel_for.h>
+
+#include "fem/detail/turned_cells.h"
 
 namespace sinew::fem {
 
@@ -16,37 +18,11 @@ std::vector<Eigen::Matrix3d> frame_rotations(const Body& body, const PosedFrames
       for (FrameWeights::InnerIterator it(body.weights, a); it; ++it)
         sum += it.value() * pose.frames[static_cast<std::size_t>(it.col())].rotation;
     }
-    rotations[c] = polar_rotation(sum);
+    rotations[c] = sum / 8.0;
   });
+  detail::polar_rotations(rotations);
   return rotations;
 }
-
-namespace {
-
-/// Polar rotation by Newton's iteration M <- (g M + M^-T / g) / 2 ([Higham86]), g the ratio of the norms: a
-/// few products where a singular value decomposition takes hundreds. Cells near collapse take the latter.
-Eigen::Matrix3d quick_polar_rotation(const Eigen::Matrix3d& matrix) {
-  constexpr double kFlat = 1e-4;      // of a volume: below, the iteration wastes its first steps
-  constexpr double kSettled = 1e-14;  // the next step is at rounding: convergence is quadratic
-  Eigen::Matrix3d m = matrix;
-  for (int k = 0; k < 30; ++k) {
-    Eigen::Matrix3d inverse;  // M^-T, the cofactors over the determinant
-    inverse.col(0) = m.col(1).cross(m.col(2));
-    inverse.col(1) = m.col(2).cross(m.col(0));
-    inverse.col(2) = m.col(0).cross(m.col(1));
-    const double det = m.col(0).dot(inverse.col(0)), norm = m.norm();
-    if (!(det > kFlat * norm * norm * norm)) break;
-    inverse /= det;
-    const double g = std::sqrt(inverse.norm() / norm);
-    const Eigen::Matrix3d next = 0.5 * (g * m + inverse / g);
-    const double change = (next - m).cwiseAbs().maxCoeff();
-    m = next;
-    if (change < kSettled) return m;
-  }
-  return polar_rotation(matrix);
-}
-
-}  // namespace
 
 PolarRotations::PolarRotations(const Body& body) : body_(body) {
   for (std::size_t c = 0; c < body.mesh.cells.size(); ++c) {
@@ -61,32 +37,23 @@ PolarRotations::PolarRotations(const Body& body) : body_(body) {
 std::vector<Eigen::Matrix3d> PolarRotations::operator()(const Points& x) const {
   std::vector<Eigen::Matrix3d> rotations(mean_gradient_.size());
   tbb::parallel_for(std::size_t{0}, rotations.size(), [&](std::size_t c) {
-    rotations[c] = quick_polar_rotation(cell_points(x, body_.mesh.cells[c]) * mean_gradient_[c]);
+    rotations[c] = cell_points(x, body_.mesh.cells[c]) * mean_gradient_[c];
   });
+  detail::polar_rotations(rotations);
   return rotations;
 }
 
-CellVector turned(const Eigen::Matrix3d& rotation, const CellVector& vector) {
-  const CellPoints points = rotation * Eigen::Map<const CellPoints>(vector.data());
-  return Eigen::Map<const CellVector>(points.data());
-}
-
-RotatedStiffness::RotatedStiffness(const Body& body) : body_(body) {
-  for (std::size_t c = 0; c < body.mesh.cells.size(); ++c) {
-    stiffness_.push_back(cell_stiffness(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]),
-                                        body.fill[c], body.materials[c]));
-    rest_.push_back(cell_points(body.mesh.points, body.mesh.cells[c]));
-  }
-}
-
-CellVector RotatedStiffness::displacement(int cell, const Eigen::Matrix3d& rotation, const Points& x) const {
-  const auto c = static_cast<std::size_t>(cell);
-  const CellPoints u = rotation.transpose() * cell_points(x, body_.mesh.cells[c]) - rest_[c];
-  return Eigen::Map<const CellVector>(u.data());
-}
+RotatedStiffness::RotatedStiffness(const Body& body)
+    : body_(body),
+      cells_(std::make_shared<detail::TurnedCells>(
+          detail::CellGroups(body.mesh.cells, body.mesh.num_vertices()), [&](int cell) {
+            const auto c = static_cast<std::size_t>(cell);
+            return cell_stiffness(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]), body.fill[c],
+                                  body.materials[c]);
+          })) {}
 
 CellStiffness RotatedStiffness::rotated(int cell, const Eigen::Matrix3d& rotation) const {
-  const CellStiffness& k = stiffness(cell);
+  const CellStiffness k = cells_->stiffness(cell);
   CellStiffness half, result;
   for (int a = 0; a < 8; ++a) half.middleRows<3>(3 * a).noalias() = rotation * k.middleRows<3>(3 * a);
   for (int b = 0; b < 8; ++b)
@@ -95,14 +62,19 @@ CellStiffness RotatedStiffness::rotated(int cell, const Eigen::Matrix3d& rotatio
 }
 
 CellForces RotatedStiffness::forces(const Points& x, const std::vector<Eigen::Matrix3d>& rotations) const {
+  std::vector<double> corners;
+  const std::array<detail::TurnedPlace, 2> displacement{{{1.0, &x, &rotations}, {-1.0, &body_.mesh.points}}};
+  cells_->forces(rotations, displacement, corners);
   CellForces result;
-  result.energy.resize(stiffness_.size());
-  result.force.resize(stiffness_.size());
-  tbb::parallel_for(std::size_t{0}, stiffness_.size(), [&](std::size_t c) {
-    const CellVector u = displacement(static_cast<int>(c), rotations[c], x);
-    const CellVector local = stiffness_[c] * u;
-    result.energy[c] = 0.5 * u.dot(local);
-    result.force[c] = turned(rotations[c], local);
+  result.energy.resize(rotations.size());
+  result.force.resize(rotations.size());
+  tbb::parallel_for(std::size_t{0}, rotations.size(), [&](std::size_t c) {
+    CellPoints force;
+    for (int k = 0; k < 8; ++k) force.col(k) = cells_->groups().corner(static_cast<int>(c), k, corners);
+    const CellPoints u = cell_points(x, body_.mesh.cells[c]) -
+                         rotations[c] * cell_points(body_.mesh.points, body_.mesh.cells[c]);
+    result.energy[c] = 0.5 * u.cwiseProduct(force).sum();
+    result.force[c] = Eigen::Map<const CellVector>(force.data());
   });
   return result;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include "fem/models/cell_energy.h"
 #include "fem/models/model.h"
@@ -8,6 +9,9 @@
 /// Linear elasticity of every leaf cell in a rotation of its own: f = R K (R^T x - X), with K of
 /// fem/cell_matrices.h. What the rotations follow is the difference between models.
 namespace sinew::fem {
+namespace detail {
+class TurnedCells;
+}
 
 /// R of every leaf cell for leaf positions x in a pose.
 using CellRotations =
@@ -28,26 +32,22 @@ class PolarRotations {
   std::vector<lattice::HexGradients> mean_gradient_;
 };
 
-/// K and rest corners of the leaf cells.
+/// K and rest corners of the leaf cells; copies share them.
 class RotatedStiffness {
  public:
   explicit RotatedStiffness(const Body& body);
 
-  const CellStiffness& stiffness(int cell) const { return stiffness_[static_cast<std::size_t>(cell)]; }
-  /// R^T x - X of the corners.
-  CellVector displacement(int cell, const Eigen::Matrix3d& rotation, const lattice::Points& x) const;
   /// R K R^T.
   CellStiffness rotated(int cell, const Eigen::Matrix3d& rotation) const;
   /// Energy 1/2 u^T K u and forces R K u of all cells.
   CellForces forces(const lattice::Points& x, const std::vector<Eigen::Matrix3d>& rotations) const;
 
+  /// K as it is packed for products with all cells at once.
+  const detail::TurnedCells& cells() const { return *cells_; }
+
  private:
   const Body& body_;
-  std::vector<CellStiffness> stiffness_;
-  std::vector<CellPoints> rest_;
+  std::shared_ptr<const detail::TurnedCells> cells_;
 };
-
-/// A cell vector with every corner turned by `rotation`.
-CellVector turned(const Eigen::Matrix3d& rotation, const CellVector& vector);
 
 }  // namespace sinew::fem
