@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "fem/detail/anderson_mixing.h"
 #include "fem/models/balance.h"
 #include "fem/placement.h"
 
@@ -43,19 +44,25 @@ Equilibrium find_equilibrium(const Body& body, const PosePath& path, const Equil
     // The flesh rides on its frames to where the next pose begins.
     Points x = carried(body, result.x, result.pose, pose);
     SolveReport report;
-    // A pressure follows the surface: its forces are taken where the flesh stands, until that stays put.
-    constexpr int kMostTurns = 200;
+    // A pressure follows the surface: its forces are taken where the flesh stands, until that stays put. On
+    // slender flesh plain repetition drifts apart: the tip of a bar turns further than the force that turned
+    // it.
+    constexpr int kMostTurns = 100;
+    detail::AndersonMixing mixing(8);
+    Points place = x;  // where the pressure is taken
+    int hardest = 0;   // turn, in iterations: what the next load step goes by
     for (int turn = 0; turn < kMostTurns; ++turn) {
-      const Points force = factor * forces.at(x);
-      const Points before = x;
+      const Points force = factor * forces.at(place);
       report = model->equilibrate({&pose, factor * options.gravity, &force}, x);
       if (!report.ok()) return report;
-      if (!forces.follow() || (x - before).cwiseAbs().maxCoeff() < 1e-11 * body.size) break;
+      report.iterations = hardest = std::max(hardest, report.iterations);
+      if (!forces.follow() || (x - place).cwiseAbs().maxCoeff() < 1e-11 * body.size) break;
       if (turn + 1 == kMostTurns) {
         report.status = SolveStatus::NoConvergence;
         report.message = options.model + ": pressure and flesh do not settle on one shape";
         return report;
       }
+      place += mixing.step(x - place);
     }
     result.x = std::move(x);
     result.pose = pose;

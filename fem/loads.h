@@ -26,7 +26,8 @@ struct FaceSet {
   double slack = 1e-9;
 };
 
-/// A pressure that pushes against the posed surface and turns with it.
+/// A pressure that pushes against the posed surface and turns with it. In statics flesh is found at rest
+/// until some of it has turned by about 90 degrees.
 struct PressureLoad {
   FaceSet faces;
   double pressure = 0.0;  ///< [Pa]; positive pushes inwards.

@@ -1,14 +1,13 @@
 #include "fem/models/blended.h"
 
 #include <cmath>
-#include <deque>
 #include <stdexcept>
 #include <vector>
 
-#include <Eigen/QR>
 #include <fmt/format.h>
 
 #include "fem/blended_solver.h"
+#include "fem/detail/anderson_mixing.h"
 #include "fem/models/balance.h"
 #include "fem/models/free_system.h"
 #include "fem/models/repeated_factor.h"
@@ -51,44 +50,6 @@ struct RestSystem {
     factor.solve(Eigen::Map<Eigen::VectorXd>(image.data(), image.size()));
     return image;
   }
-};
-
-/// Anderson's mixing for a zero of g: the combination of the last steps whose g is least, and from there a
-/// whole step of that g.
-class AndersonMixing {
- public:
-  explicit AndersonMixing(std::size_t depth) : depth_(depth) {}
-
-  /// What to add to the present point, where g is `g`.
-  lattice::Points step(const lattice::Points& g) {
-    if (!last_g_.size()) return remember(g, g);
-    changes_.push_back({last_step_, g - last_g_});
-    if (changes_.size() > depth_) changes_.pop_front();
-    Eigen::MatrixXd of_g(g.size(), static_cast<Eigen::Index>(changes_.size()));
-    for (std::size_t k = 0; k < changes_.size(); ++k)
-      of_g.col(static_cast<Eigen::Index>(k)) =
-          Eigen::Map<const Eigen::VectorXd>(changes_[k].g.data(), g.size());
-    const Eigen::VectorXd share =
-        of_g.colPivHouseholderQr().solve(Eigen::Map<const Eigen::VectorXd>(g.data(), g.size()));
-    lattice::Points move = g;
-    for (std::size_t k = 0; k < changes_.size(); ++k)
-      move -= share[static_cast<Eigen::Index>(k)] * (changes_[k].x + changes_[k].g);
-    return remember(g, move);
-  }
-
- private:
-  struct Change {
-    lattice::Points x, g;
-  };
-  lattice::Points remember(const lattice::Points& g, const lattice::Points& move) {
-    last_g_ = g;
-    last_step_ = move;
-    return move;
-  }
-
-  std::size_t depth_;
-  std::deque<Change> changes_;
-  lattice::Points last_g_, last_step_;
 };
 
 class Blended final : public Model {
@@ -209,7 +170,7 @@ SolveReport Blended::equilibrate(const PoseProblem& problem, lattice::Points& x)
   lattice::Points place = x;
   place_bones(body_, *problem.pose, place);
   fill_inactive_leaves(body_, place);
-  AndersonMixing mixing(10);
+  detail::AndersonMixing mixing(10);
   lattice::Points v;
   for (; report.iterations < kMostIterations; ++report.iterations) {
     v = first_velocity(problem, kStep, place);
