@@ -1,11 +1,10 @@
-// Long, as the systems of the regions, their matrices and the step on them share one private layout.
-
 #include "fem/blended_solver.h"
 
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -14,41 +13,17 @@
 
 #include "fem/detail/coordinates.h"
 #include "fem/detail/couples.h"
+#include "fem/detail/region_systems.h"
 #include "fem/growth.h"
 
 namespace sinew::fem {
 namespace {
 
 using detail::Coordinates;
+using detail::RegionSystem;
 using Inputs = detail::CoupleInputs;
 using lattice::Points;
-using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
-
-/// Everything of one region that does not change with the step size.
-struct RegionSystem {
-  const Region* region = nullptr;
-  std::vector<int> functions;  ///< unknown ones first, then known neighbours.
-  int num_unknown = 0;
-  std::vector<int>
-      vertices;  ///< leaf vertices: rows (where an unknown function lives) first, then their neighbours.
-  int num_rows = 0;
-  RowSparse values;                      ///< vertices x functions (local).
-  bool values_are_coefficients = false;  ///< `values` is the identity: true in the nodal basis.
-  RowSparse rows_to_unknown;   ///< num_unknown x num_rows: transpose of the unknown part of `values`.
-  std::vector<int> row_start;  ///< of the rows' neighbours,
-  std::vector<int> column;     ///< as local vertices;
-  std::vector<int> entry;      ///< entries of the body's matrices start here, per row.
-  std::vector<int> blended;    ///< local vertex of each of region->vertices, -1 for bone vertices.
-  std::vector<std::pair<int, std::vector<std::pair<int, int>>>> ties;  ///< tie, (its entry, local row).
-
-  // Buffers of the step, so that a step allocates nothing.
-  std::vector<Inputs> coefficients;  ///< per function.
-  std::vector<Inputs> inputs;        ///< per local vertex.
-  Points row_force;                  ///< per row.
-  Points velocity;                   ///< per function, in rotated axes.
-  Eigen::VectorXd solution, workspace;
-  Points result;  ///< contribution to the blended velocity, one row per region->vertices.
-};
+using RowSparse = RegionSystem::RowSparse;
 
 }  // namespace
 
@@ -61,163 +36,12 @@ struct BlendedSolver::Impl {
   /// Systems that have a leaf vertex among their rows: (system, row).
   std::vector<std::vector<std::pair<int, int>>> rows_of_vertex;
   std::map<std::pair<double, Integrator>, std::vector<Factor>> factors;
-  std::vector<std::vector<int>> vertex_cells;  ///< leaf cells round a leaf vertex.
-  std::vector<std::vector<int>> vertex_functions;
 
-  void build_systems();
-  RegionSystem build_system(const Region& region) const;
-  Eigen::SparseMatrix<double> matrix_of(const RegionSystem& system, const SystemFactors& c) const;
   struct StepData;
   void gather_inputs(RegionSystem& system, const StepData& step) const;
   void apply_matrices(int vertex);
   void solve_region(RegionSystem& system, const StepData& step, const Factor& factor) const;
 };
-
-namespace {
-
-std::vector<std::uint8_t> grow(const lattice::LeafMesh& mesh, const std::vector<std::uint8_t>& cells) {
-  std::vector<std::uint8_t> touched(static_cast<std::size_t>(mesh.num_vertices()), 0);
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    if (!cells[c]) continue;
-    for (int a : mesh.cells[c]) touched[static_cast<std::size_t>(a)] = 1;
-  }
-  std::vector<std::uint8_t> grown(cells.size(), 0);
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    for (int a : mesh.cells[c]) grown[c] = grown[c] || touched[static_cast<std::size_t>(a)];
-  }
-  return grown;
-}
-
-}  // namespace
-
-RegionSystem BlendedSolver::Impl::build_system(const Region& region) const {
-  const lattice::LeafMesh& mesh = body->mesh;
-  RegionSystem system;
-  system.region = &region;
-  // Core: leaf cells with a vertex of w > 0. Unknown: functions whose support meets the core, and those whose
-  // own vertex lies in the rings round it.
-  std::vector<std::uint8_t> core(mesh.cells.size(), 0);
-  for (int a : region.vertices) {
-    for (int c : vertex_cells[static_cast<std::size_t>(a)]) core[static_cast<std::size_t>(c)] = 1;
-  }
-  std::vector<std::uint8_t> ringed = core;
-  for (int r = 0; r < options.rings; ++r) ringed = grow(mesh, ringed);
-  std::vector<std::uint8_t> is_unknown(static_cast<std::size_t>(coordinates.num_functions()), 0);
-  std::vector<std::uint8_t> in_ring(static_cast<std::size_t>(mesh.num_vertices()), 0);
-  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
-    for (int a : mesh.cells[c]) {
-      if (ringed[c]) in_ring[static_cast<std::size_t>(a)] = 1;
-      if (!core[c]) continue;
-      for (int f : vertex_functions[static_cast<std::size_t>(a)]) is_unknown[static_cast<std::size_t>(f)] = 1;
-    }
-  }
-  for (int f = 0; f < coordinates.num_functions(); ++f) {
-    const auto i = static_cast<std::size_t>(f);
-    if (in_ring[static_cast<std::size_t>(coordinates.vertex[i])]) is_unknown[i] = 1;
-    if (coordinates.is_known[i]) is_unknown[i] = 0;
-  }
-  std::vector<int> local_function(is_unknown.size(), -1);
-  for (int f = 0; f < coordinates.num_functions(); ++f) {
-    if (!is_unknown[static_cast<std::size_t>(f)]) continue;
-    local_function[static_cast<std::size_t>(f)] = static_cast<int>(system.functions.size());
-    system.functions.push_back(f);
-  }
-  system.num_unknown = static_cast<int>(system.functions.size());
-
-  // Rows: vertices where an unknown function does not vanish; then their neighbours.
-  std::vector<int> local_vertex(static_cast<std::size_t>(mesh.num_vertices()), -1);
-  for (int a = 0; a < mesh.num_vertices(); ++a) {
-    const auto& functions = vertex_functions[static_cast<std::size_t>(a)];
-    if (std::none_of(functions.begin(), functions.end(),
-                     [&](int f) { return is_unknown[static_cast<std::size_t>(f)]; }))
-      continue;
-    local_vertex[static_cast<std::size_t>(a)] = static_cast<int>(system.vertices.size());
-    system.vertices.push_back(a);
-  }
-  system.num_rows = static_cast<int>(system.vertices.size());
-  const LeafMatrices& matrices = body->matrices;
-  system.row_start.push_back(0);
-  for (int r = 0; r < system.num_rows; ++r) {
-    const auto a = static_cast<std::size_t>(system.vertices[static_cast<std::size_t>(r)]);
-    system.entry.push_back(matrices.row_start[a]);
-    for (int e = matrices.row_start[a]; e < matrices.row_start[a + 1]; ++e) {
-      const auto b = static_cast<std::size_t>(matrices.column[static_cast<std::size_t>(e)]);
-      if (local_vertex[b] < 0) {
-        local_vertex[b] = static_cast<int>(system.vertices.size());
-        system.vertices.push_back(static_cast<int>(b));
-      }
-      system.column.push_back(local_vertex[b]);
-    }
-    system.row_start.push_back(static_cast<int>(system.column.size()));
-  }
-  std::vector<Eigen::Triplet<double>> triplets, transposed;
-  for (std::size_t r = 0; r < system.vertices.size(); ++r) {
-    for (RowSparse::InnerIterator it(coordinates.values, system.vertices[r]); it; ++it) {
-      int& local = local_function[static_cast<std::size_t>(it.col())];
-      if (local < 0) {
-        local = static_cast<int>(system.functions.size());
-        system.functions.push_back(static_cast<int>(it.col()));
-      }
-      triplets.emplace_back(static_cast<int>(r), local, it.value());
-      if (local < system.num_unknown) transposed.emplace_back(local, static_cast<int>(r), it.value());
-    }
-  }
-  system.values.resize(static_cast<Eigen::Index>(system.vertices.size()),
-                       static_cast<Eigen::Index>(system.functions.size()));
-  system.values.setFromTriplets(triplets.begin(), triplets.end());
-  RowSparse identity(system.values.rows(), system.values.rows());
-  identity.setIdentity();
-  system.values_are_coefficients = system.values.rows() == system.values.cols() &&
-                                   RowSparse(system.values - identity).squaredNorm() == 0.0;
-  system.rows_to_unknown.resize(system.num_unknown, system.num_rows);
-  system.rows_to_unknown.setFromTriplets(transposed.begin(), transposed.end());
-  for (int a : region.vertices) {
-    system.blended.push_back(
-        body->bones.is_bone[static_cast<std::size_t>(a)] ? -1 : local_vertex[static_cast<std::size_t>(a)]);
-  }
-  for (std::size_t t = 0; t < body->ties.size(); ++t) {
-    std::vector<std::pair<int, int>> rows;
-    for (std::size_t k = 0; k < body->ties[t].vertices.size(); ++k) {
-      const int r = local_vertex[static_cast<std::size_t>(body->ties[t].vertices[k])];
-      if (r >= 0 && r < system.num_rows) rows.emplace_back(static_cast<int>(k), r);
-    }
-    if (!rows.empty()) system.ties.emplace_back(static_cast<int>(t), std::move(rows));
-  }
-  const auto num_functions = static_cast<Eigen::Index>(system.functions.size());
-  system.coefficients.resize(system.functions.size());
-  system.inputs.resize(system.vertices.size());
-  system.velocity.resize(num_functions, 3);
-  system.row_force.resize(system.num_rows, 3);
-  system.solution.resize(3 * system.num_unknown);
-  system.result.resize(static_cast<Eigen::Index>(region.vertices.size()), 3);
-  return system;
-}
-
-void BlendedSolver::Impl::build_systems() {
-  const lattice::LeafMesh& mesh = body->mesh;
-  vertex_cells.resize(static_cast<std::size_t>(mesh.num_vertices()));
-  vertex_functions.resize(vertex_cells.size());
-  for (int c = 0; c < static_cast<int>(mesh.cells.size()); ++c) {
-    for (int a : mesh.cells[static_cast<std::size_t>(c)])
-      vertex_cells[static_cast<std::size_t>(a)].push_back(c);
-  }
-  for (int a = 0; a < mesh.num_vertices(); ++a) {
-    for (RowSparse::InnerIterator it(coordinates.values, a); it; ++it) {
-      vertex_functions[static_cast<std::size_t>(a)].push_back(static_cast<int>(it.col()));
-    }
-  }
-  systems.resize(body->regions.size());
-  tbb::parallel_for(std::size_t{0}, systems.size(),
-                    [&](std::size_t i) { systems[i] = build_system(body->regions[i]); });
-  rows_of_vertex.resize(static_cast<std::size_t>(mesh.num_vertices()));
-  for (std::size_t i = 0; i < systems.size(); ++i) {
-    for (int r = 0; r < systems[i].num_rows; ++r) {
-      rows_of_vertex[static_cast<std::size_t>(systems[i].vertices[static_cast<std::size_t>(r)])].emplace_back(
-          static_cast<int>(i), r);
-    }
-  }
-  couples = detail::Couples(body->matrices);
-}
 
 BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
     : impl_(std::make_unique<Impl>()) {
@@ -225,61 +49,19 @@ BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
   impl_->options = options;
   impl_->coordinates = options.basis == Basis::Nodal ? detail::nodal_coordinates(body)
                                                      : detail::hierarchical_coordinates(body);
-  impl_->build_systems();
+  impl_->systems = detail::region_systems(body, impl_->coordinates, options.rings);
+  impl_->rows_of_vertex.resize(static_cast<std::size_t>(body.mesh.num_vertices()));
+  for (std::size_t i = 0; i < impl_->systems.size(); ++i) {
+    const RegionSystem& system = impl_->systems[i];
+    for (int r = 0; r < system.num_rows; ++r) {
+      const int vertex = system.vertices[static_cast<std::size_t>(r)];
+      impl_->rows_of_vertex[static_cast<std::size_t>(vertex)].emplace_back(static_cast<int>(i), r);
+    }
+  }
+  impl_->couples = detail::Couples(body.matrices);
 }
 BlendedSolver::~BlendedSolver() = default;
 BlendedSolver::BlendedSolver(BlendedSolver&&) noexcept = default;
-
-/// A_i = B_U^T (cM M + cK K + cP P) B_U over the region's rows.
-Eigen::SparseMatrix<double> BlendedSolver::Impl::matrix_of(const RegionSystem& system,
-                                                           const SystemFactors& scale) const {
-  const LeafMatrices& matrices = body->matrices;
-  std::vector<Eigen::Triplet<double>> triplets;
-  triplets.reserve(9 * system.column.size());
-  for (int r = 0; r < system.num_rows; ++r) {
-    const auto row = static_cast<std::size_t>(r);
-    for (int k = system.row_start[row]; k < system.row_start[row + 1]; ++k) {
-      const int column = system.column[static_cast<std::size_t>(k)];
-      if (column >= system.num_rows) continue;
-      const auto e = static_cast<std::size_t>(system.entry[row] + k - system.row_start[row]);
-      Eigen::Matrix3d block = scale.stiffness * matrices.stiffness[e];
-      block.diagonal().array() += scale.mass * matrices.mass[e] + scale.tie * matrices.tie[e];
-      for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) triplets.emplace_back(3 * r + i, 3 * column + j, block(i, j));
-      }
-    }
-  }
-  Eigen::SparseMatrix<double> nodal(3 * system.num_rows, 3 * system.num_rows);
-  nodal.setFromTriplets(triplets.begin(), triplets.end());
-  triplets.clear();
-  for (int f = 0; f < system.num_unknown; ++f) {
-    for (RowSparse::InnerIterator it(system.rows_to_unknown, f); it; ++it) {
-      for (int c = 0; c < 3; ++c)
-        triplets.emplace_back(3 * static_cast<int>(it.col()) + c, 3 * f + c, it.value());
-    }
-  }
-  Eigen::SparseMatrix<double> basis(3 * system.num_rows, 3 * system.num_unknown);
-  basis.setFromTriplets(triplets.begin(), triplets.end());
-  return basis.transpose() * (nodal * basis);
-}
-
-namespace {
-
-/// Flags of the system's rows whose solution the blended vertices read; the rest, most of the ring, is
-/// discarded.
-std::vector<std::uint8_t> wanted_rows(const RegionSystem& system) {
-  std::vector<std::uint8_t> wanted(static_cast<std::size_t>(3 * system.num_unknown), 0);
-  for (int vertex : system.blended) {
-    if (vertex < 0) continue;
-    for (RowSparse::InnerIterator it(system.values, vertex); it; ++it) {
-      if (it.col() >= system.num_unknown) continue;
-      for (int c = 0; c < 3; ++c) wanted[static_cast<std::size_t>(3 * it.col() + c)] = 1;
-    }
-  }
-  return wanted;
-}
-
-}  // namespace
 
 Factor::Report BlendedSolver::prepare(double h, Integrator integrator) {
   auto& factors = impl_->factors[{h, integrator}];
@@ -297,8 +79,8 @@ Factor::Report BlendedSolver::prepare(double h, Integrator integrator) {
       reports[i].ok = true;
     } else {
       const RegionSystem& system = impl_->systems[i];
-      reports[i] =
-          factors[i].factorise(impl_->matrix_of(system, c), impl_->options.precision, wanted_rows(system));
+      reports[i] = factors[i].factorise(detail::region_matrix(*impl_->body, system, c),
+                                        impl_->options.precision, detail::wanted_rows(system));
     }
   });
   for (std::size_t i = 0; i < reports.size(); ++i) {

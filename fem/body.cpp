@@ -23,8 +23,7 @@ void validate_material(const Material& m) {
   require(m.density > 0.0, "density", m.density, "a positive number of kg/m^3");
 }
 
-/// Leaf cells whose level-0 owner cell ... the dominant frame of a cell: the frame with the largest sum over
-/// corners.
+/// The dominant frame of a leaf cell: the one with the largest sum over its corners.
 int dominant_frame(const FrameWeights& weights, const lattice::HexVertices& cell) {
   std::map<int, double> sums;
   for (int a : cell) {
@@ -91,7 +90,7 @@ void rescue_bones(const lattice::ControlLattice& lattice, std::vector<std::uint8
 }
 
 /// Everything below indexes weights by skin vertex and frames by joint.
-void check_input(const BodyInput& input) {
+void check_input(const BodyInput& input, const BodyOptions& options) {
   const auto num_joints = static_cast<double>(input.skeleton.num_joints());
   const auto& weights = input.skin.weights;
   require(input.skin.points.rows() == static_cast<Eigen::Index>(weights.size()), "skin weights",
@@ -107,6 +106,15 @@ void check_input(const BodyInput& input) {
     require(static_cast<int>(pose.size()) == input.skeleton.num_joints(), "pose",
             static_cast<double>(pose.size()),
             "one transform per joint, " + std::to_string(input.skeleton.num_joints()));
+  }
+  const auto require_joint = [&](int joint, const char* field) {
+    require(joint >= 0 && joint < num_joints, field, joint,
+            "0 to " + std::to_string(input.skeleton.num_joints() - 1));
+  };
+  for (const JointMaterial& m : options.materials) require_joint(m.joint, "material's joint");
+  for (const JointTie& tie : options.ties.joints) require_joint(tie.joint, "twist's joint");
+  for (const auto& group : options.regions.groups) {
+    for (const int joint : group) require_joint(joint, "region's joint");
   }
 }
 
@@ -182,29 +190,53 @@ std::vector<Material> leaf_materials(const BodyInput& input, const BodyOptions& 
   return materials;
 }
 
-enum class Assembly { Left, Done };
+/// A lattice that is its own mirror image.
+struct LatticeMirror {
+  lattice::MirrorMap map;
+  std::vector<int> partners;  ///< of the hierarchy's vertices.
+};
 
-Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly) {
-  options.validate();
-  check_input(input);
+std::optional<LatticeMirror> lattice_mirror(const BodyInput& input, const lattice::Hierarchy& hierarchy) {
+  if (!further_frames(input).empty()) return std::nullopt;  // they are in no lattice
+  std::optional<lattice::MirrorMap> map = lattice::find_mirror_map(input.lattice, input.skin);
+  if (!map) return std::nullopt;
+  std::vector<int> partners = lattice::mirrored_vertices(hierarchy, *map);
+  return LatticeMirror{std::move(*map), std::move(partners)};
+}
+
+/// Which leaf cells stay: those with flesh or skin, and with them all others of their coarse cell. Were only
+/// some of its children kept, a level-0 hat could reach kept cells without having its own vertex there, and
+/// it would be a combination of details.
+std::vector<std::uint8_t> kept_cells(const BodyInput& input, const lattice::Hierarchy& hierarchy,
+                                     const lattice::LeafMesh& mesh, std::vector<std::uint8_t> keep,
+                                     const LatticeMirror* mirror) {
+  std::vector<std::uint8_t> keep_coarse(hierarchy.coarse().cells.size(), 0);
+  const auto coarse_of = [&](std::size_t c) {
+    return static_cast<std::size_t>(lattice::coarse_cell(hierarchy, mesh, static_cast<int>(c)));
+  };
+  for (std::size_t c = 0; c < keep.size(); ++c) keep_coarse[coarse_of(c)] |= keep[c];
+  for (std::size_t c = 0; mirror != nullptr && c < keep_coarse.size(); ++c)
+    if (keep_coarse[c]) keep_coarse[static_cast<std::size_t>(mirror->map.cells[c])] = 1;
+  rescue_bones(input.lattice, keep_coarse);
+  for (std::size_t c = 0; c < keep.size(); ++c) keep[c] = keep_coarse[coarse_of(c)];
+  return keep;
+}
+
+/// Embeds the skin, each vertex in a cell of its own limb.
+lattice::Embedding own_embedding(const BodyInput& input, const lattice::LeafMesh& mesh,
+                                 const lattice::LeafLimbs& limbs) {
+  return lattice::embed(mesh, input.skin.points,
+                        [&](int vertex, int cell) { return limbs.owns_vertex(cell, vertex); });
+}
+
+/// Fills the leaf cells of `mesh` and drops those without flesh from it.
+std::vector<lattice::FillFractions> fill_with_flesh(const BodyInput& input, const BodyOptions& options,
+                                                    const lattice::Hierarchy& hierarchy,
+                                                    const FrameTree& tree, const LatticeMirror* mirror,
+                                                    lattice::LeafMesh& mesh) {
   const double h = input.lattice.edge_length;
-  lattice::Hierarchy hierarchy(input.lattice.complex, std::max(1, options.levels));
-  const lattice::ActiveSet active =
-      lattice::uniform_active_set(hierarchy, options.levels, hard_chains(input.lattice));
-  lattice::LeafMesh mesh = lattice::leaf_mesh(hierarchy, active);
-  check_orientation(mesh);
-  FrameTree tree = frame_tree(input.lattice, input.skeleton, further_frames(input));
-  const std::optional<lattice::MirrorMap> map =
-      further_frames(input).empty() ? lattice::find_mirror_map(input.lattice, input.skin) : std::nullopt;
-  const std::vector<int> partners = map ? lattice::mirrored_vertices(hierarchy, *map) : std::vector<int>{};
-
-  // Drop cells without flesh; embed again in what is left, since indices change.
   const lattice::SurfaceQuery query(input.skin.points, input.skin.triangles);
   const lattice::LeafLimbs limbs(input.lattice, hierarchy, mesh, input.skin);
-  const auto own_skin = [](const lattice::LeafLimbs& of) {
-    return [&of](int vertex, int cell) { return of.owns_vertex(cell, vertex); };
-  };
-  lattice::Embedding skin = lattice::embed(mesh, input.skin.points, own_skin(limbs));
   std::vector<lattice::FillFractions> fill = lattice::fill_fractions(mesh, query, options.shell * h, &limbs);
   // A quarter of a level-1 cell: no octant that the skin crosses for more than a corner is overlooked.
   const double spacing = 0.125 * h * std::exp2(1 - std::max(1, options.levels));
@@ -213,30 +245,54 @@ Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly)
   lattice::fill_grazed_octants(mesh, samples.points, fill, [&](int sample, int cell) {
     return limbs.owns_vertex(cell, samples.vertices[static_cast<std::size_t>(sample)]);
   });
-  if (map) symmetrise(body_mirror(*map, partners, tree, mesh), fill);
-  std::vector<std::uint8_t> keep = lattice::filled_cells(fill, skin.cell);
-  // A coarse cell stays or goes as a whole: were only some of its children kept, a level-0 hat could reach
-  // kept cells without having its own vertex there, and it would be a combination of details.
-  std::vector<std::uint8_t> keep_coarse(hierarchy.coarse().cells.size(), 0);
-  const auto coarse_of = [&](std::size_t c) {
-    return static_cast<std::size_t>(lattice::coarse_cell(hierarchy, mesh, static_cast<int>(c)));
-  };
-  for (std::size_t c = 0; c < keep.size(); ++c) keep_coarse[coarse_of(c)] |= keep[c];
-  for (std::size_t c = 0; map && c < keep_coarse.size(); ++c)
-    if (keep_coarse[c]) keep_coarse[static_cast<std::size_t>(map->cells[c])] = 1;
-  rescue_bones(input.lattice, keep_coarse);
-  for (std::size_t c = 0; c < keep.size(); ++c) keep[c] = keep_coarse[coarse_of(c)];
+  if (mirror != nullptr) symmetrise(body_mirror(mirror->map, mirror->partners, tree, mesh), fill);
+  const std::vector<std::uint8_t> keep = kept_cells(
+      input, hierarchy, mesh, lattice::filled_cells(fill, own_embedding(input, mesh, limbs).cell), mirror);
   std::vector<lattice::FillFractions> kept_fill;
   for (std::size_t c = 0; c < keep.size(); ++c) {
     if (keep[c]) kept_fill.push_back(fill[c]);
   }
   if (kept_fill.empty()) throw std::invalid_argument("no lattice cell holds any flesh");
   mesh = lattice::restrict_cells(hierarchy, mesh, keep);
-  const lattice::LeafLimbs kept_limbs(input.lattice, hierarchy, mesh, input.skin);
-  skin = lattice::embed(mesh, input.skin.points, own_skin(kept_limbs));
+  return kept_fill;
+}
 
+/// Mass of each vertex and volume of the flesh, from matrices and fill.
+void weigh(Body& body) {
+  body.vertex_mass.assign(static_cast<std::size_t>(body.mesh.num_vertices()), 0.0);
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    for (int e = body.matrices.row_start[static_cast<std::size_t>(a)];
+         e < body.matrices.row_start[static_cast<std::size_t>(a) + 1]; ++e) {
+      body.vertex_mass[static_cast<std::size_t>(a)] += body.matrices.mass[static_cast<std::size_t>(e)];
+    }
+  }
+  for (std::size_t c = 0; c < body.mesh.cells.size(); ++c) {
+    for (double w : gauss_weights(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]), body.fill[c]))
+      body.volume += w;
+  }
+}
+
+enum class Assembly { Left, Done };
+
+/// Left: matrices, ties and masses are not made.
+Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly) {
+  options.validate();
+  check_input(input, options);
+  const double h = input.lattice.edge_length;
+  lattice::Hierarchy hierarchy(input.lattice.complex, std::max(1, options.levels));
+  const lattice::ActiveSet active =
+      lattice::uniform_active_set(hierarchy, options.levels, hard_chains(input.lattice));
+  lattice::LeafMesh mesh = lattice::leaf_mesh(hierarchy, active);
+  check_orientation(mesh);
+  FrameTree tree = frame_tree(input.lattice, input.skeleton, further_frames(input));
+  const std::optional<LatticeMirror> whole = lattice_mirror(input, hierarchy);
+  std::vector<lattice::FillFractions> fill =
+      fill_with_flesh(input, options, hierarchy, tree, whole ? &*whole : nullptr, mesh);
+  const lattice::LeafLimbs limbs(input.lattice, hierarchy, mesh, input.skin);
+  lattice::Embedding skin = own_embedding(input, mesh, limbs);
   const std::optional<BodyMirror> mirror =
-      map ? std::optional(body_mirror(*map, partners, tree, mesh)) : std::nullopt;
+      whole ? std::optional(body_mirror(whole->map, whole->partners, tree, mesh)) : std::nullopt;
+
   BoneConstraints bones = bone_constraints(input.lattice, tree, hierarchy, mesh);
   hold_planes(input.held, tree, mesh, bones);
   FrameWeights weights = frame_weights(hierarchy, mesh, skin, input.skin, tree, bones);
@@ -245,13 +301,13 @@ Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly)
   const std::vector<Material> of_frame = frame_materials(tree, options);
   std::vector<Material> materials = leaf_materials(input, options, hierarchy, mesh, weights, of_frame);
   LeafMatrices matrices;
-  if (assembly == Assembly::Done) matrices = assemble(mesh, materials, kept_fill);
+  if (assembly == Assembly::Done) matrices = assemble(mesh, materials, fill);
   std::vector<double> mu_of_frame;
   for (const Material& m : of_frame) mu_of_frame.push_back(m.mu());
-  const LimbRadii radii(input.lattice, tree, input.skin, h, map ? &*map : nullptr);
+  const LimbRadii radii(input.lattice, tree, input.skin, h, whole ? &whole->map : nullptr);
   std::vector<Tie> ties;
   if (assembly == Assembly::Done)
-    ties = add_ties(input.lattice, tree, radii, mesh, kept_limbs, mu_of_frame, h, options.ties, matrices);
+    ties = add_ties(input.lattice, tree, radii, mesh, limbs, mu_of_frame, h, options.ties, matrices);
 
   std::vector<PosedFrames> posed;
   for (const auto& pose : input.poses) posed.push_back(pose_frames(tree, pose, 0.0));
@@ -263,7 +319,7 @@ Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly)
             std::move(hierarchy),
             std::move(mesh),
             std::move(skin),
-            std::move(kept_fill),
+            std::move(fill),
             std::move(materials),
             std::move(matrices),
             std::move(tree),
@@ -280,17 +336,7 @@ Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly)
   body.size = (body.mesh.points.colwise().maxCoeff() - body.mesh.points.colwise().minCoeff()).norm();
   if (assembly == Assembly::Left) return body;
   if (body.grows) body.bone_extension = bone_extension(body.hierarchy, body.mesh, body.skin, body.bones);
-  body.vertex_mass.assign(static_cast<std::size_t>(body.mesh.num_vertices()), 0.0);
-  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
-    for (int e = body.matrices.row_start[static_cast<std::size_t>(a)];
-         e < body.matrices.row_start[static_cast<std::size_t>(a) + 1]; ++e) {
-      body.vertex_mass[static_cast<std::size_t>(a)] += body.matrices.mass[static_cast<std::size_t>(e)];
-    }
-  }
-  for (std::size_t c = 0; c < body.mesh.cells.size(); ++c) {
-    for (double w : gauss_weights(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]), body.fill[c]))
-      body.volume += w;
-  }
+  weigh(body);
   return body;
 }
 

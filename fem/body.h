@@ -88,8 +88,8 @@ struct BodyInput {
   std::vector<int> bare_frames = {};
 };
 
-/// Throws std::invalid_argument where a cell is inverted, no cell holds flesh, the skin has no weights or
-/// names a joint that is not there, or an option is out of range.
+/// Throws std::invalid_argument where a cell is inverted, no cell holds flesh, the skin has no weights, it or
+/// the options name a joint that is not there, or an option is out of range.
 Body make_body(const BodyInput& input, const BodyOptions& options = {});
 
 /// The same without what it takes to move: no matrices, no ties, no masses. For looking at fill, materials

@@ -11,8 +11,8 @@ namespace sinew::fem {
 /// How thick the flesh round a bone is.
 class LimbRadii {
  public:
-  /// `window` h [m]: skin that projects onto the bone within it of a point counts there. Of a mirrored
-  /// lattice, partners have the skin of both.
+  /// `window` h [m]: skin that projects onto the bone within it of a point counts there. With `mirror`, of a
+  /// mirrored lattice, partners have the skin of both; null: none is looked at.
   LimbRadii(const lattice::ControlLattice& lattice, const FrameTree& tree, const lattice::Surface& skin,
             double window, const lattice::MirrorMap* mirror = nullptr);
 

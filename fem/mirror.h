@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <array>
 #include <vector>
 
 #include "fem/frame_weights.h"
@@ -21,8 +21,8 @@ struct BodyMirror {
   std::vector<int> frames;    ///< per frame of the tree its partner.
   std::vector<int> vertices;  ///< per leaf vertex.
   std::vector<int> cells;     ///< per leaf cell.
-  std::vector<std::array<int, 8>>
-      corners;  ///< per leaf cell: the partner's corner that is the image of each.
+  /// Per leaf cell: the partner's corner that is the image of each of its own.
+  std::vector<std::array<int, 8>> corners;
 };
 
 /// `vertices`: the partners in the hierarchy (lattice::mirrored_vertices). `mesh` must be mirrored, and every

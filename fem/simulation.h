@@ -28,8 +28,8 @@ struct SimulationOptions {
   /// Which model of the flesh steps: a name of the registry (fem/models/model.h).
   std::string model{kDefaultModel};
   SolverOptions solver;
-  Loads
-      loads;  ///< from the start on; pressures follow the surface to where its velocity takes it in a stage.
+  /// From the start on; pressures follow the surface to where its velocity takes it in a stage.
+  Loads loads;
   /// Further forces on the leaf vertices at a time, num_vertices x 3 [N]; empty: none.
   std::function<lattice::Points(double time)> force;
 

@@ -140,15 +140,6 @@ std::vector<std::uint8_t> cells_at_segment(const lattice::LeafMesh& mesh, const 
   return holds;
 }
 
-/// The radius below which a tube could slip between the samples of a level-1 cell. Pieces of a chain are at
-/// most 1.65 edges long on the mean where all cells are of one size.
-double smallest_radius(const lattice::LatticeBone& bone, double edge_length) {
-  constexpr double kLongestPiece = 1.65;
-  const double pieces = static_cast<double>(std::max<std::size_t>(2, bone.chain.size()) - 1);
-  const double piece = bone.chain.empty() ? 0.0 : (bone.rest_end - bone.rest_start).norm() / pieces;
-  return 0.25 * std::max(edge_length, piece / kLongestPiece);
-}
-
 JointTie override_of(const TieOptions& options, int joint) {
   JointTie found;
   for (const JointTie& tie : options.joints)
@@ -158,12 +149,19 @@ JointTie override_of(const TieOptions& options, int joint) {
 
 }  // namespace
 
+double smallest_radius(const lattice::LatticeBone& bone, double edge_length) {
+  constexpr double kLongestPiece = 1.65;  // in the mean over a chain, in edges, where cells are of one size
+  const double pieces = static_cast<double>(std::max<std::size_t>(2, bone.chain.size()) - 1);
+  const double piece = bone.chain.empty() ? 0.0 : (bone.rest_end - bone.rest_start).norm() / pieces;
+  return 0.25 * std::max(edge_length, piece / kLongestPiece);
+}
+
 std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
                           const LimbRadii& radii, const lattice::LeafMesh& mesh,
                           const lattice::LeafLimbs& limbs, const std::vector<double>& mu_of_frame,
                           double edge_length, const TieOptions& options, LeafMatrices& matrices) {
   std::vector<Tie> ties;
-  const double smallest = 0.25 * edge_length;
+  const double spacing = 0.25 * edge_length;  // of points along soft bones
   for (int b = 0; b < static_cast<int>(lattice.bones.size()); ++b) {
     const auto& bone = lattice.bones[static_cast<std::size_t>(b)];
     const int frame = tree.frame_of_joint[static_cast<std::size_t>(bone.frame)];
@@ -175,7 +173,7 @@ std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTre
     const double kappa = c * mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
     const std::vector<std::uint8_t> holds_bone =
         bone.chain.empty()
-            ? cells_at_segment(mesh, limbs, bone.frame, bone.rest_start, bone.rest_end, smallest)
+            ? cells_at_segment(mesh, limbs, bone.frame, bone.rest_start, bone.rest_end, spacing)
             : cells_at_chain(mesh, bone.chain);
     ties.push_back(add_tie({bone.rest_start, bone.rest_end, radius}, frame, bone.frame, kappa, mesh, limbs,
                            holds_bone, matrices));
@@ -188,7 +186,7 @@ std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTre
     const double kappa = own.stiffness.value_or(options.soft_stiffness) *
                          mu_of_frame[static_cast<std::size_t>(frame)] / (radius * radius);
     ties.push_back(add_tie({soft.position, soft.position, radius}, frame, soft.frame, kappa, mesh, limbs,
-                           cells_at_segment(mesh, limbs, soft.frame, soft.position, soft.position, smallest),
+                           cells_at_segment(mesh, limbs, soft.frame, soft.position, soft.position, spacing),
                            matrices));
   }
   std::erase_if(ties, [](const Tie& tie) { return tie.vertices.empty(); });

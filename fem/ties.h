@@ -23,9 +23,13 @@ struct JointTie {
 struct TieOptions {
   double stiffness = 10.0;        ///< c of hard bones [-]; >= 0.
   double soft_stiffness = 100.0;  ///< c of soft bones and soft frames [-]; > 0.
-  double radius = 0.25;  ///< r as a share of the local limb radius [-]; > 0. How thick the bone feels.
+  double radius = 0.25;           ///< r as a share of the limb's radius [-]; > 0. How thick the bone feels.
   std::vector<JointTie> joints = {};  ///< overrides; of several for one joint the last counts.
 };
+
+/// The least radius of a bone's tube [m]; below, it could slip between the samples of a level-1 cell. A
+/// quarter of `edge_length`, or of what the pieces of its chain say where cells are larger there.
+double smallest_radius(const lattice::LatticeBone& bone, double edge_length);
 
 /// One tie: what its target T_b X contributes to the force, per leaf vertex it touches.
 struct Tie {
@@ -39,9 +43,9 @@ struct Tie {
 };
 
 /// Adds the ties' matrices to matrices.tie (P = sum_b P_b) and returns their targets. The tube's radius does
-/// not depend on the active level: at least a quarter of `edge_length` (half a level-1 cell), or of what the
-/// bone's pieces say where cells are larger there; unless an override says it. Of cells that
-/// coincide only the one of the tie's own limb (`limbs`) is held.
+/// not depend on the active level: at least smallest_radius, unless an override says it. Of cells that
+/// coincide only the one of the tie's own limb (`limbs`) is held, and of the tube what hangs together with
+/// the cells that hold the bone. A tie that reaches no flesh is left out.
 std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
                           const LimbRadii& radii, const lattice::LeafMesh& mesh,
                           const lattice::LeafLimbs& limbs, const std::vector<double>& mu_of_frame,

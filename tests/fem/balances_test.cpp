@@ -182,59 +182,57 @@ Linear hanging(const Body& body) {
 /// Steps of 1/30 s: the lowest swings of the block take 12, the fastest are far below a step.
 constexpr double kStep = 1.0 / 30.0;
 
-// With u the displacement from where the body hangs, energy E(u, v) = (u^T K u + v^T M v) / 2:
-//   E(u+, v+) - E(u, v) + E(u+ - u, v+ - v) + h v+^T C v+ = 0.
-TEST(EnergyBalance, OfBackwardEulerHoldsToRounding) {
+/// Expects that `balance` of the states from `first` on, each given with those before it, is zero, of an
+/// undamped and of a damped body. The energy itself must fall where it does, or there were nothing to
+/// balance.
+template <class Balance>
+void expect_balance(Integrator integrator, std::size_t first, const Balance& balance) {
   for (const Damping& damping : {Damping{0.0, 1.0}, tests::rayleigh(0.5, 0.002)}) {
     const Body body = block(1e4, true, damping);
     const Linear linear = hanging(body);
-    const auto all = samples(linear, Integrator::BackwardEuler, kStep, 30);
+    const std::vector<Sample> all = samples(linear, integrator, kStep, 30);
     const double scale = linear.energy(all[0].u, all[0].v);
-    for (std::size_t n = 1; n < all.size(); ++n) {
-      const Sample &now = all[n], &before = all[n - 1];
-      const double balance = linear.energy(now.u, now.v) - linear.energy(before.u, before.v) +
-                             linear.energy(now.u - before.u, now.v - before.v) + kStep * linear.damped(now.v);
-      EXPECT_LE(std::abs(balance), 1e-11 * scale) << n;  // rounding, condition 1e3
-    }
-    EXPECT_LT(linear.energy(all.back().u, all.back().v), 0.8 * scale);  // there is something to balance
+    for (std::size_t n = first; n < all.size(); ++n)
+      EXPECT_LE(std::abs(balance(linear, all, n)), 1e-11 * scale) << n;  // rounding, condition 1e3
+    if (integrator == Integrator::ImplicitMidpoint && damping.ratio == 0.0) continue;
+    EXPECT_LT(linear.energy(all.back().u, all.back().v), 0.99 * scale);
   }
+}
+
+// With u the displacement from where the body hangs, energy E(u, v) = (u^T K u + v^T M v) / 2:
+//   E(u+, v+) - E(u, v) + E(u+ - u, v+ - v) + h v+^T C v+ = 0.
+TEST(EnergyBalance, OfBackwardEulerHoldsToRounding) {
+  expect_balance(Integrator::BackwardEuler, 1,
+                 [](const Linear& linear, const std::vector<Sample>& all, std::size_t n) {
+                   const Sample &now = all[n], &before = all[n - 1];
+                   return linear.energy(now.u, now.v) - linear.energy(before.u, before.v) +
+                          linear.energy(now.u - before.u, now.v - before.v) + kStep * linear.damped(now.v);
+                 });
 }
 
 // E+ - E + h w^T C w = 0 with w = (u+ - u) / h.
 TEST(EnergyBalance, OfTheMidpointRuleHoldsToRounding) {
-  for (const Damping& damping : {Damping{0.0, 1.0}, tests::rayleigh(0.5, 0.002)}) {
-    const Body body = block(1e4, true, damping);
-    const Linear linear = hanging(body);
-    const auto all = samples(linear, Integrator::ImplicitMidpoint, kStep, 30);
-    const double scale = linear.energy(all[0].u, all[0].v);
-    for (std::size_t n = 1; n < all.size(); ++n) {
-      const Sample &now = all[n], &before = all[n - 1];
-      const double balance = linear.energy(now.u, now.v) - linear.energy(before.u, before.v) +
-                             kStep * linear.damped((now.u - before.u) / kStep);
-      EXPECT_LE(std::abs(balance), 1e-11 * scale) << n;
-    }
-  }
+  expect_balance(Integrator::ImplicitMidpoint, 1,
+                 [](const Linear& linear, const std::vector<Sample>& all, std::size_t n) {
+                   const Sample &now = all[n], &before = all[n - 1];
+                   return linear.energy(now.u, now.v) - linear.energy(before.u, before.v) +
+                          kStep * linear.damped((now.u - before.u) / kStep);
+                 });
 }
 
 // G-stability: with G(a, b) = (E(a) + E(2 a - b)) / 2 over two states and d = a+ - 2 a + a-,
 //   G(a+, a) - G(a, a-) + E(d) / 2 + h v+^T C v+ = 0.
 TEST(EnergyBalance, OfBdf2HoldsToRounding) {
-  for (const Damping& damping : {Damping{0.0, 1.0}, tests::rayleigh(0.5, 0.002)}) {
-    const Body body = block(1e4, true, damping);
-    const Linear linear = hanging(body);
-    const auto all = samples(linear, Integrator::Bdf2, kStep, 30);
-    const double scale = linear.energy(all[0].u, all[0].v);
-    const auto g = [&](const Sample& a, const Sample& b) {
-      return 0.5 * (linear.energy(a.u, a.v) + linear.energy(2.0 * a.u - b.u, 2.0 * a.v - b.v));
-    };
-    for (std::size_t n = 2; n < all.size(); ++n) {
-      const Sample &now = all[n], &before = all[n - 1], &past = all[n - 2];
-      const double lost =
-          0.5 * linear.energy(now.u - 2.0 * before.u + past.u, now.v - 2.0 * before.v + past.v);
-      const double balance = g(now, before) - g(before, past) + lost + kStep * linear.damped(now.v);
-      EXPECT_LE(std::abs(balance), 1e-11 * scale) << n;
-    }
-  }
+  expect_balance(Integrator::Bdf2, 2,
+                 [](const Linear& linear, const std::vector<Sample>& all, std::size_t n) {
+                   const auto g = [&](const Sample& a, const Sample& b) {
+                     return 0.5 * (linear.energy(a.u, a.v) + linear.energy(2.0 * a.u - b.u, 2.0 * a.v - b.v));
+                   };
+                   const Sample &now = all[n], &before = all[n - 1], &past = all[n - 2];
+                   const double lost =
+                       0.5 * linear.energy(now.u - 2.0 * before.u + past.u, now.v - 2.0 * before.v + past.v);
+                   return g(now, before) - g(before, past) + lost + kStep * linear.damped(now.v);
+                 });
 }
 
 // TR-BDF2's middle state is its own; without damping its energy falls at every step, and over a fixed time by

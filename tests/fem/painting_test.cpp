@@ -29,6 +29,18 @@ TEST(Painting, GivesOneBoneAThickerAndStifferPull) {
   EXPECT_THROW(tests::arm_body(arm, 2.0, options), std::invalid_argument);
 }
 
+TEST(Painting, RefusesJointsThatAreNotThere) {
+  const tests::Arm arm = tests::make_arm();  // of three joints
+  for (const int joint : {-1, 3}) {
+    BodyOptions of_material, of_tie, of_region;
+    of_material.materials = {{joint, {}}};
+    of_tie.ties.joints = {{joint, 0.1, {}}};
+    of_region.regions.groups = {{0, joint}};
+    for (const BodyOptions& options : {of_material, of_tie, of_region})
+      EXPECT_THROW(tests::arm_body(arm, 1.0, options), std::invalid_argument) << joint;
+  }
+}
+
 TEST(Painting, PutsBonesInTheRegionsThatTheUserWants) {
   const tests::Arm arm = tests::make_arm();
   EXPECT_EQ(tests::arm_body(arm, 1.0).regions.size(), 3u) << "both bones and the elbow between them";
