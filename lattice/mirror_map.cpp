@@ -7,8 +7,7 @@
 #include <map>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
+#include "lattice/detail/mirror_planes.h"
 #include "lattice/detail/point_finder.h"
 
 namespace sinew::lattice {
@@ -185,20 +184,10 @@ bool MirrorFinder::skin_agrees() const {
   return sum <= kWeightTolerance * static_cast<double>(skin_.points.rows());
 }
 
-/// Half-way between the outermost vertices: exact for every plane of symmetry with this normal.
-MirrorPlane plane_of(const Points& points, const Vector3d& normal) {
-  const Eigen::VectorXd along = points * normal;
-  return {normal, 0.5 * (along.minCoeff() + along.maxCoeff())};
-}
-
 std::vector<MirrorPlane> candidates(const Points& points) {
   std::vector<MirrorPlane> planes;
-  for (const int axis : {0, 2, 1}) planes.push_back(plane_of(points, Vector3d::Unit(axis)));
-  const Eigen::RowVector3d mean = points.colwise().mean();
-  const Points centred = points.rowwise() - mean;
-  const Eigen::Matrix3d covariance = centred.transpose() * centred;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(covariance);
-  for (int k = 0; k < 3; ++k) planes.push_back(plane_of(points, principal.eigenvectors().col(k)));
+  for (const int axis : {0, 2, 1}) planes.push_back(detail::middle_plane(points, Vector3d::Unit(axis)));
+  for (const MirrorPlane& plane : detail::principal_planes(points)) planes.push_back(plane);
   return planes;
 }
 

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "lattice/detail/cell_sizes.h"
+#include "lattice/detail/reduction.h"
 #include "lattice/detail/segments.h"
 #include "lattice/detail/symmetry.h"
 
@@ -17,92 +16,24 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A joint needs this share of the skin's area for a frame of its own; below, its parent's frame serves it.
-constexpr double kOwnFrame = 1e-4;
-/// A tip bone reaches this share of the way from its joint to its farthest vertex.
-constexpr double kTipReach = 0.8;
-/// A tip bone of a contracted joint must be this long, in units of h: five fingers contracted into a hand
-/// shall not become five bones out of one point.
-constexpr double kContractedTip = 1.0;
 /// A chained bone may turn by so many degrees where it goes on.
 constexpr double kSharpestChain = 60.0;
 
-class Reduction {
- public:
-  Reduction(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights, double h,
-            const ReductionOptions& options, const std::vector<int>* mirror_joint)
-      : skin_(skin),
-        joints_(joints),
-        weights_(weights),
-        h_(h),
-        options_(options),
-        mirror_joint_(mirror_joint),
-        n_(num_joints()) {
-    for (double a : weights_.area) total_area_ += a;
-  }
+}  // namespace
 
-  ReducedSkeleton run() {
-    prune();
-    place_nodes();
-    chain_siblings();
-    soften_close_bones();
-    if (mirror_joint_ != nullptr) soften_bones_at_their_image();
-    add_tips();
-    soften_wanted_bones();
-    drop_unused_nodes();
-    if (mirror_joint_ != nullptr) add_mirror_images();
-    name_bones();
-    return std::move(result_);
-  }
-
- private:
-  int num_joints() const { return static_cast<int>(joints_.parents.size()); }
-  Vector3d position(int joint) const { return joints_.positions.row(joint).transpose(); }
-  Vector3d start(const ReducedBone& b) const { return result_.nodes[b.start].position; }
-  Vector3d end(const ReducedBone& b) const { return result_.nodes[b.end].position; }
-  double length(const ReducedBone& b) const { return (end(b) - start(b)).norm(); }
-  double h_at(const Vector3d& p) const {
-    return options_.sizes == nullptr ? h_ : options_.sizes->edge_at(p, h_);
-  }
-  double metres(double unit_length) const { return unit_length * skin_.scale; }
-  void report(int joint, const char* what, std::string reason) {
-    result_.changes.push_back({joints_.names[joint], what, std::move(reason)});
-    changed_joints_.push_back(joint);
-  }
-
-  void prune();
-  bool is_cut(int parent, int child, std::string& reason) const;
-  void place_nodes();
-  void chain_siblings();
-  bool chain_one_pair();
-  bool lie_side_by_side(const ReducedBone& shorter, const ReducedBone& longer) const;
-  void soften_close_bones();
-  void soften_wanted_bones();
-  void soften_bones_at_their_image();
-  bool is_close_to_image(const Vector3d& a, const Vector3d& b) const;
-  void add_mirror_images();
-  void soften(int bone, const std::string& reason);
-  bool is_leaf(const ReducedBone& bone) const;
-  void add_tips();
-  bool add_tip(int joint, double smallest, const std::vector<double>& vertex_weight);
-  Vector3d soft_position(int joint, const std::vector<double>& vertex_weight) const;
-  std::string conflict(const Vector3d& a, const Vector3d& b, int node) const;
-  void drop_unused_nodes();
-  void name_bones();
-
-  const UnitSkin& skin_;
-  const JointTree& joints_;
-  const JointWeights& weights_;
-  double h_;
-  ReductionOptions options_;
-  const std::vector<int>* mirror_joint_;
-  int n_;
-  double total_area_ = 0.0;
-  std::vector<bool> kept_;           ///< per joint.
-  std::vector<int> node_of_;         ///< per joint; -1 where pruned.
-  std::vector<int> changed_joints_;  ///< of result_.changes.
-  ReducedSkeleton result_;
-};
+ReducedSkeleton Reduction::run() {
+  prune();
+  place_nodes();
+  chain_siblings();
+  soften_close_bones();
+  if (mirror_joint_ != nullptr) soften_bones_at_their_image();
+  add_tips();
+  soften_wanted_bones();
+  drop_unused_nodes();
+  if (mirror_joint_ != nullptr) add_mirror_images();
+  name_bones();
+  return std::move(result_);
+}
 
 /// Drops subtrees without skin weight, and weightless joints above the weighted skeleton that do not branch.
 void Reduction::prune() {
@@ -199,65 +130,67 @@ void Reduction::chain_siblings() {
 /// shorter but would have to turn aside there: the two legs of a biped whose hips are one node.
 bool Reduction::lie_side_by_side(const ReducedBone& shorter, const ReducedBone& longer) const {
   const Vector3d on = end(longer) - end(shorter);
-  if (on.norm() <= options_.too_close * h_) return false;  // one place
+  if (on.norm() <= options_.too_close * h_at(end(shorter))) return false;  // one place
   const double turn = std::cos(kSharpestChain * std::numbers::pi / 180.0);
-  return on.normalized().dot((end(shorter) - start(shorter)).normalized()) < turn;
+  return on.normalized().dot(direction(shorter)) < turn;
 }
 
-/// Two bones out of one node that nearly coincide: the longer starts behind the shorter.
+/// Looks for two bones out of one node that nearly coincide, and chains them.
 bool Reduction::chain_one_pair() {
   const double cosine = std::cos(options_.chain_degrees * std::numbers::pi / 180.0);
   for (std::size_t i = 0; i < result_.bones.size(); ++i)
     for (std::size_t k = i + 1; k < result_.bones.size(); ++k) {
-      if (result_.bones[i].start != result_.bones[k].start) continue;
-      if (result_.bones[i].soft || result_.bones[k].soft) continue;
-      const bool swap = length(result_.bones[i]) > length(result_.bones[k]);
-      const ReducedBone shorter = result_.bones[swap ? k : i];
-      ReducedBone& longer = result_.bones[swap ? i : k];
-      const Vector3d u = (end(shorter) - start(shorter)).normalized(),
-                     v = (end(longer) - start(longer)).normalized();
+      const ReducedBone &a = result_.bones[i], &b = result_.bones[k];
+      if (a.start != b.start || a.soft || b.soft) continue;
+      const bool swap = length(a) > length(b);
+      const ReducedBone &shorter = swap ? b : a, &longer = swap ? a : b;
       const double distance = point_segment_distance(end(shorter), start(longer), end(longer));
-      if (u.dot(v) < cosine && distance > options_.too_close * h_at(end(shorter))) continue;
-      if (mirror_joint_ != nullptr && end(longer).x() == 0.0 && end(shorter).x() != 0.0) {
-        // A bone in the plane of symmetry cannot start at one side.
-        soften(
-            static_cast<int>(swap ? k : i),
-            fmt::format("it leaves '{}' within {:.0f} degrees of the bone to '{}' in the plane of symmetry",
-                        joints_.names[result_.nodes[longer.start].joint],
-                        std::acos(std::min(1.0, u.dot(v))) * 180.0 / std::numbers::pi,
-                        joints_.names[result_.nodes[longer.end].joint]));
-        return true;
-      }
-      if (lie_side_by_side(shorter, longer)) {
-        soften(static_cast<int>(swap ? k : i),
-               fmt::format("it leaves '{}' within {:.0f} degrees of the bone to '{}', beside which it ends",
-                           joints_.names[result_.nodes[longer.start].joint],
-                           std::acos(std::min(1.0, u.dot(v))) * 180.0 / std::numbers::pi,
-                           joints_.names[result_.nodes[longer.end].joint]));
-        return true;
-      }
-      const int joint = result_.nodes[longer.end].joint;
-      report(joint, "chained",
-             fmt::format("its bone leaves '{}' within {:.0f} degrees and {:.3g} m of the bone to '{}', so it "
-                         "starts there",
-                         joints_.names[result_.nodes[longer.start].joint],
-                         std::acos(std::min(1.0, u.dot(v))) * 180.0 / std::numbers::pi, metres(distance),
-                         joints_.names[result_.nodes[shorter.end].joint]));
-      longer.start = shorter.end;
-      const double smallest = options_.smallest_bone * h_at(end(longer));
-      if (length(longer) >= smallest) return true;
-      const int from = longer.end, to = longer.start;
-      report(joint, "contracted",
-             fmt::format("{:.3g} m from '{}', below {:.2g} h = {:.3g} m", metres(length(longer)),
-                         joints_.names[result_.nodes[to].joint], options_.smallest_bone, metres(smallest)));
-      result_.bones.erase(result_.bones.begin() + static_cast<std::ptrdiff_t>(swap ? i : k));
-      for (ReducedBone& bone : result_.bones)
-        if (bone.start == from) bone.start = to;
-      for (int& node : node_of_)
-        if (node == from) node = to;
+      if (direction(shorter).dot(direction(longer)) < cosine &&
+          distance > options_.too_close * h_at(end(shorter)))
+        continue;
+      chain(static_cast<int>(swap ? k : i), static_cast<int>(swap ? i : k));
       return true;
     }
   return false;
+}
+
+/// Of two bones out of one node the longer starts behind the shorter from now on; where it cannot, the
+/// shorter is held by penalty instead.
+void Reduction::chain(int shorter, int longer) {
+  const ReducedBone first = result_.bones[shorter];
+  ReducedBone& second = result_.bones[longer];
+  const double distance = point_segment_distance(end(first), start(second), end(second));
+  const double angle =
+      std::acos(std::min(1.0, direction(first).dot(direction(second)))) * 180.0 / std::numbers::pi;
+  const std::string leaves = fmt::format("leaves '{}' within {:.0f} degrees",
+                                         joints_.names[result_.nodes[second.start].joint], angle);
+  const int joint = result_.nodes[second.end].joint;
+  if (mirror_joint_ != nullptr && end(second).x() == 0.0 && end(first).x() != 0.0) {
+    // A bone in the plane of symmetry cannot start at one side.
+    soften(shorter,
+           fmt::format("it {} of the bone to '{}' in the plane of symmetry", leaves, joints_.names[joint]));
+    return;
+  }
+  if (lie_side_by_side(first, second)) {
+    soften(shorter,
+           fmt::format("it {} of the bone to '{}', beside which it ends", leaves, joints_.names[joint]));
+    return;
+  }
+  report(joint, "chained",
+         fmt::format("its bone {} and {:.3g} m of the bone to '{}', so it starts there", leaves,
+                     metres(distance), joints_.names[result_.nodes[first.end].joint]));
+  second.start = first.end;
+  const double smallest = options_.smallest_bone * h_at(end(second));
+  if (length(second) >= smallest) return;
+  const int from = second.end, to = second.start;
+  report(joint, "contracted",
+         fmt::format("{:.3g} m from '{}', below {:.2g} h = {:.3g} m", metres(length(second)),
+                     joints_.names[result_.nodes[to].joint], options_.smallest_bone, metres(smallest)));
+  result_.bones.erase(result_.bones.begin() + longer);
+  for (ReducedBone& bone : result_.bones)
+    if (bone.start == from) bone.start = to;
+  for (int& node : node_of_)
+    if (node == from) node = to;
 }
 
 bool Reduction::is_leaf(const ReducedBone& bone) const {
@@ -377,141 +310,6 @@ void Reduction::add_mirror_images() {
   }
 }
 
-/// Why no bone from a (at `node`) to b can be added; empty where it can.
-std::string Reduction::conflict(const Vector3d& a, const Vector3d& b, int node) const {
-  const double cosine = std::cos(options_.chain_degrees * std::numbers::pi / 180.0);
-  const double limit = options_.too_close * h_at(b);
-  const Vector3d direction = (b - a).normalized();
-  for (const ReducedBone& bone : result_.bones) {
-    if (bone.soft) continue;
-    double distance = 0.0;
-    if (bone.start == node || bone.end == node) {
-      const Vector3d other = bone.start == node ? end(bone) : start(bone);
-      distance = std::min(point_segment_distance(b, a, other), point_segment_distance(other, a, b));
-      if ((other - a).normalized().dot(direction) < cosine && distance > limit) continue;
-    } else {
-      distance = segment_segment_distance(a, b, start(bone), end(bone));
-      if (distance > limit) continue;
-    }
-    return fmt::format("comes within {:.3g} m of the bone from '{}' to '{}'", metres(distance),
-                       joints_.names[result_.nodes[bone.start].joint],
-                       joints_.names[result_.nodes[bone.end].joint]);
-  }
-  return "";
-}
-
-bool Reduction::add_tip(int joint, double smallest, const std::vector<double>& vertex_weight) {
-  if (options_.tip_bones == TipBones::Off) return false;
-  const int node = node_of_[joint];
-  const Vector3d from = result_.nodes[node].position;
-  const double h = h_at(from);
-  Vector3d centroid = Vector3d::Zero();
-  double area = 0.0;
-  for (std::size_t v = 0; v < vertex_weight.size(); ++v) {
-    const double w = vertex_weight[v] * skin_.areas[v];
-    centroid += w * skin_.points.row(static_cast<Eigen::Index>(v)).transpose();
-    area += w;
-  }
-  if (!(area > 0.0)) return false;
-  Vector3d toward = centroid / area - from;
-  const bool in_plane = mirror_joint_ != nullptr && (*mirror_joint_)[joint] == joint;
-  if (in_plane) toward.x() = 0.0;
-  if (toward.norm() < 0.05 * h) return false;  // no direction to speak of
-  const Vector3d direction = toward.normalized();
-  double reach = 0.0;
-  for (std::size_t v = 0; v < vertex_weight.size(); ++v)
-    if (vertex_weight[v] >= 0.5)
-      reach =
-          std::max(reach, (skin_.points.row(static_cast<Eigen::Index>(v)).transpose() - from).dot(direction));
-  double tip_length = kTipReach * reach;
-  const auto is_inside = [&](double l) {
-    int inside = 0;
-    for (int i = 1; i <= 4; ++i) inside += skin_.is_inside(from + direction * (l * i / 4.0));
-    return inside >= 3 && skin_.is_inside(from + direction * l);
-  };
-  while (tip_length >= smallest * h && !is_inside(tip_length)) tip_length *= 0.9;
-  if (tip_length < smallest * h) return false;
-  const Vector3d tip = from + tip_length * direction;
-  if (!conflict(from, tip, node).empty()) return false;
-  if (mirror_joint_ != nullptr && is_close_to_image(from, tip)) return false;
-
-  ReducedBone bone;
-  bone.frame = joint;
-  bone.start = node;
-  bone.end = static_cast<int>(result_.nodes.size());
-  bone.tip = true;
-  result_.nodes.push_back({joint, tip});
-  result_.bones.push_back(bone);
-  report(joint, "tip",
-         fmt::format("carries skin but no bone of its own: a bone of {:.3g} m toward that skin was added",
-                     metres(tip_length)));
-  return true;
-}
-
-/// A place for a soft frame: the centroid of its skin, or the joint, whichever is inside; else the vertex of
-/// greatest weight.
-Vector3d Reduction::soft_position(int joint, const std::vector<double>& vertex_weight) const {
-  Vector3d centroid = Vector3d::Zero();
-  double area = 0.0;
-  std::size_t heaviest = 0;
-  for (std::size_t v = 0; v < vertex_weight.size(); ++v) {
-    const double w = vertex_weight[v] * skin_.areas[v];
-    centroid += w * skin_.points.row(static_cast<Eigen::Index>(v)).transpose();
-    area += w;
-    if (vertex_weight[v] > vertex_weight[heaviest]) heaviest = v;
-  }
-  if (area > 0.0 && skin_.is_inside(centroid / area)) return centroid / area;
-  if (skin_.is_inside(position(joint))) return position(joint);
-  return skin_.points.row(static_cast<Eigen::Index>(heaviest)).transpose();
-}
-
-/// Weighted joints that own no bone, leaves first: a tip bone, else a soft frame, else (contracted joints)
-/// their weight counts for the parent.
-void Reduction::add_tips() {
-  std::vector<bool> owns(n_, false);
-  for (const ReducedBone& bone : result_.bones) owns[bone.frame] = true;
-  std::vector<std::vector<int>> served(n_);  // joints whose weight counts for this one
-  for (int j = n_ - 1; j >= 0; --j) {
-    if (!kept_[j]) continue;
-    served[j].push_back(j);
-    if (owns[j]) continue;
-    double area = 0.0;
-    for (int s : served[j]) area += weights_.area[s];
-    const bool is_anchor = result_.nodes[node_of_[j]].joint == j;
-    // The frame is the joint that carries the skin: a weightless joint at the same place (a control that
-    // scales or turns what is below it) may move otherwise.
-    int carrier = j;
-    for (int s : served[j])
-      if (node_of_[s] == node_of_[j] && weights_.area[s] > weights_.area[carrier]) carrier = s;
-    if (weights_.area[j] > 0.0) carrier = j;
-    if (area > kOwnFrame * total_area_) {
-      std::vector<double> vertex_weight(skin_.points.rows(), 0.0);
-      for (int s : served[j])
-        for (const auto& [v, w] : weights_.vertices[s]) vertex_weight[v] += w;
-      if (add_tip(carrier,
-                  is_anchor ? options_.smallest_bone : std::max(options_.smallest_bone, kContractedTip),
-                  vertex_weight)) {
-        continue;
-      }
-      if (is_anchor) {
-        SoftFrame frame;
-        frame.frame = carrier;
-        frame.position = soft_position(j, vertex_weight);
-        if (mirror_joint_ != nullptr && (*mirror_joint_)[carrier] == carrier) frame.position.x() = 0.0;
-        result_.soft_frames.push_back(frame);
-        report(carrier, "soft frame",
-               fmt::format("carries {:.2g} % of the skin but {}", 100.0 * area / total_area_,
-                           options_.tip_bones == TipBones::On ? "has no room for a bone"
-                                                              : "has no bone, and tip bones are off"));
-        continue;
-      }
-    }
-    const int parent = joints_.parents[j];
-    if (parent >= 0 && kept_[parent])
-      served[parent].insert(served[parent].end(), served[j].begin(), served[j].end());
-  }
-}
-
 void Reduction::drop_unused_nodes() {
   std::vector<int> new_index(result_.nodes.size(), -1);
   for (const ReducedBone& bone : result_.bones) new_index[bone.start] = new_index[bone.end] = 0;
@@ -538,60 +336,10 @@ void Reduction::name_bones() {
   }
 }
 
-/// Breadth-first nearest descendant that is a frame, or -1.
-int nearest_descendant(int joint, const std::vector<std::vector<int>>& children,
-                       const std::vector<bool>& is_frame) {
-  std::vector<int> queue{joint};
-  for (std::size_t i = 0; i < queue.size(); ++i) {
-    if (is_frame[queue[i]]) return queue[i];
-    queue.insert(queue.end(), children[queue[i]].begin(), children[queue[i]].end());
-  }
-  return -1;
-}
-
-}  // namespace
-
-JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints, const std::vector<int>& stand_in) {
-  const int n = static_cast<int>(joints.parents.size());
-  JointWeights result{std::vector<double>(n, 0.0),
-                      {},
-                      std::vector<std::vector<std::pair<int, double>>>(n),
-                      std::vector<bool>(n, false)};
-  for (std::size_t v = 0; v < skin.weights.size(); ++v)
-    for (const Influence& influence : skin.weights[v]) {
-      if (!(influence.weight > 0.0)) continue;
-      const int joint = stand_in[influence.frame];
-      result.area[joint] += influence.weight * skin.areas[v];
-      result.vertices[joint].emplace_back(static_cast<int>(v), influence.weight);
-    }
-  result.subtree_area = result.area;
-  for (int j = n - 1; j >= 0; --j)
-    if (joints.parents[j] >= 0) result.subtree_area[joints.parents[j]] += result.subtree_area[j];
-  return result;
-}
-
 ReducedSkeleton reduce_skeleton(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights,
                                 double h, const ReductionOptions& options,
                                 const std::vector<int>* mirror_joint) {
   return Reduction(skin, joints, weights, h, options, mirror_joint).run();
-}
-
-std::vector<int> frame_of_joint(const std::vector<int>& parents, const std::vector<int>& frames) {
-  const int n = static_cast<int>(parents.size());
-  std::vector<int> result(n, -1);
-  if (frames.empty()) return result;
-  std::vector<bool> is_frame(n, false);
-  for (int f : frames) is_frame[f] = true;
-  std::vector<std::vector<int>> children(n);
-  for (int j = 0; j < n; ++j)
-    if (parents[j] >= 0) children[parents[j]].push_back(j);
-  for (int j = 0; j < n; ++j) {
-    int found = j;
-    while (found >= 0 && !is_frame[found]) found = parents[found];
-    if (found < 0) found = nearest_descendant(j, children, is_frame);
-    result[j] = found >= 0 ? found : *std::min_element(frames.begin(), frames.end());
-  }
-  return result;
 }
 
 }  // namespace sinew::lattice::detail

@@ -5,7 +5,7 @@
 
 #include "lattice/build.h"
 #include "lattice/control_lattice.h"
-#include "lattice/detail/unit_skin.h"
+#include "lattice/detail/joint_weights.h"
 
 namespace sinew::lattice::detail {
 
@@ -18,9 +18,6 @@ struct SoftBone {
   bool tip = false;
   std::string reason;  ///< for the report.
 };
-
-/// Joints with less than this share of the skin's area count as weightless: stray weights of exporters.
-inline constexpr double kWeightless = 1e-6;
 
 /// Thresholds of the reduction; lengths in units of h, the target edge of the place.
 struct ReductionOptions {
@@ -63,27 +60,11 @@ struct ReducedSkeleton {
   std::vector<int> mirror_bone;
 };
 
-/// How the skin hangs on the joints; independent of h.
-struct JointWeights {
-  std::vector<double> area;          ///< skin area (unit coordinates) times weight of each joint.
-  std::vector<double> subtree_area;  ///< the same with all descendants.
-  /// Vertices of each joint with their weights.
-  std::vector<std::vector<std::pair<int, double>>> vertices;
-  std::vector<bool> excluded;  ///< joints that the user left out: no weight, no parent, no child.
-};
-/// `stand_in` says for every joint which one its weight counts for.
-JointWeights joint_weights(const UnitSkin& skin, const JointTree& joints, const std::vector<int>& stand_in);
-
 /// Reduces the joint tree at target edge `h` (unit coordinates, like the positions of `joints`). With
 /// `mirror_joint` (per joint its exact mirror image in x = 0, -1 for joints without skin) only the half x >=
 /// 0 is reduced and then mirrored; bones too close to their own image become soft.
 ReducedSkeleton reduce_skeleton(const UnitSkin& skin, const JointTree& joints, const JointWeights& weights,
                                 double h, const ReductionOptions& options,
                                 const std::vector<int>* mirror_joint = nullptr);
-
-/// For every joint the frame its weight counts for: itself if it owns a bone or a soft frame, else the
-/// nearest ancestor that does, else the nearest descendant, else the first frame there is; -1 where there is
-/// none.
-std::vector<int> frame_of_joint(const std::vector<int>& parents, const std::vector<int>& frames);
 
 }  // namespace sinew::lattice::detail

@@ -7,10 +7,10 @@
 #include <numeric>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "lattice/detail/mirror_planes.h"
 #include "lattice/detail/point_finder.h"
 
 namespace sinew::lattice::detail {
@@ -22,33 +22,16 @@ using Eigen::Vector3d;
 /// weights are painted in steps of a percent.
 constexpr double kWeightShare = 0.02, kStrayWeight = 1e-3;
 
-struct Plane {
-  Vector3d normal;
-  double offset;
-  Vector3d reflect(const Vector3d& p) const { return p - 2.0 * (normal.dot(p) - offset) * normal; }
-  double side(const Vector3d& p) const { return normal.dot(p) - offset; }
-};
-
-/// Half-way between the outermost vertices: exact for every plane of symmetry with this normal.
-Plane plane_of(const Points& points, const Vector3d& normal) {
-  const Eigen::VectorXd along = points * normal;
-  return {normal, 0.5 * (along.minCoeff() + along.maxCoeff())};
-}
-
-std::vector<Plane> candidates(const Points& points) {
-  std::vector<Plane> planes;
+std::vector<MirrorPlane> candidates(const Points& points) {
+  std::vector<MirrorPlane> planes;
   // The box is centred on 0, so that planes normal to the axes need no offset.
   for (const int axis : {0, 2, 1}) planes.push_back({Vector3d::Unit(axis), 0.0});
-  const Eigen::RowVector3d mean = points.colwise().mean();
-  const Points centred = points.rowwise() - mean;
-  const Eigen::Matrix3d covariance = centred.transpose() * centred;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(covariance);
-  for (int k = 0; k < 3; ++k) planes.push_back(plane_of(points, principal.eigenvectors().col(k)));
+  for (const MirrorPlane& plane : principal_planes(points)) planes.push_back(plane);
   return planes;
 }
 
 /// Per joint its partner; nothing and a reason where one has none.
-std::optional<std::vector<int>> match_joints(const Plane& plane, const JointTree& joints,
+std::optional<std::vector<int>> match_joints(const MirrorPlane& plane, const JointTree& joints,
                                              const JointWeights& weights, std::string& why_not) {
   const int n = static_cast<int>(joints.parents.size());
   const double total = std::accumulate(weights.area.begin(), weights.area.end(), 0.0);
@@ -59,7 +42,7 @@ std::optional<std::vector<int>> match_joints(const Plane& plane, const JointTree
     if (!carries(j) || partner[j] >= 0) continue;
     const int parent = joints.parents[j];
     const bool top = parent < 0 || !carries(parent);
-    const Vector3d image = plane.reflect(position(j));
+    const Vector3d image = plane.image(position(j));
     int best = -1;
     double best_difference = std::numeric_limits<double>::infinity();
     for (int m = j; m < n; ++m) {
@@ -96,10 +79,10 @@ MirrorSearch find_mirror(const UnitSkin& skin, const JointTree& unit_joints, con
   const PointFinder finder(skin.points);
   MirrorSearch search;
   Eigen::Index fewest = skin.points.rows() + 1;
-  for (const Plane& plane : candidates(skin.points)) {
+  for (const MirrorPlane& plane : candidates(skin.points)) {
     Eigen::Index alone = 0;
     for (Eigen::Index v = 0; v < skin.points.rows(); ++v)
-      if (!finder.has_near(plane.reflect(skin.points.row(v).transpose()), kMirrorTolerance)) ++alone;
+      if (!finder.has_near(plane.image(skin.points.row(v).transpose()), kMirrorTolerance)) ++alone;
     std::string reason =
         fmt::format("{} of {} skin vertices have no mirror image", alone, skin.points.rows());
     if (alone == 0) {
