@@ -14,6 +14,14 @@ Entry vector_entry(const TomlReader& reader, const char* key, Eigen::Vector3d& v
   return {key, [&](const toml::node& node, const std::string& where) { value = reader.vector(node, where); }};
 }
 
+/// Reads a key and notes that it was there.
+Entry noted_vector(const TomlReader& reader, const char* key, Eigen::Vector3d& value, bool& has) {
+  return {key, [&](const toml::node& node, const std::string& where) {
+            value = reader.vector(node, where);
+            has = true;
+          }};
+}
+
 Entry number_entry(const TomlReader& reader, const char* key, double& value) {
   return {key, [&](const toml::node& node, const std::string& where) { value = reader.number(node, where); }};
 }
@@ -47,14 +55,15 @@ Entry face_entry(const TomlReader& reader, std::optional<BoxFace>& face) {
           }};
 }
 
+[[noreturn]] void refuse_missing(const TomlReader& reader, const toml::table& table, const std::string& where,
+                                 const std::string& what) {
+  throw ConfigError(fmt::format("{}: {}: {}", reader.place(table), where, what));
+}
+
 void read_box(const TomlReader& reader, const toml::table& table, PlainBox& box) {
   bool has_size = false;
   reader.read_table(table, "lattice",
-                    {{"box",
-                      [&](const toml::node& node, const std::string& where) {
-                        box.size = reader.vector(node, where);
-                        has_size = true;
-                      }},
+                    {noted_vector(reader, "box", box.size, has_size),
                      vector_entry(reader, "corner", box.corner),
                      {"cells", [&](const toml::node& node,
                                    const std::string& where) { box.cells = counts(reader, node, where); }},
@@ -93,18 +102,12 @@ PlainKey read_key(const TomlReader& reader, const toml::table& table, const std:
 PlainBone read_bone(const TomlReader& reader, const toml::table& table, const std::string& where) {
   PlainBone bone;
   bool has_start = false, has_end = false;
-  const auto point = [&](Eigen::Vector3d& value, bool& has) {
-    return [&reader, &value, &has](const toml::node& node, const std::string& at) {
-      value = reader.vector(node, at);
-      has = true;
-    };
-  };
   reader.read_table(
       table, where,
       {string_entry(reader, "name", bone.name),
        string_entry(reader, "parent", bone.parent),
-       {"start", point(bone.start, has_start)},
-       {"end", point(bone.end, has_end)},
+       noted_vector(reader, "start", bone.start, has_start),
+       noted_vector(reader, "end", bone.end, has_end),
        {"soft", [&](const toml::node& node, const std::string& at) { bone.soft = reader.boolean(node, at); }},
        {"keys", [&](const toml::node& node, const std::string& at) {
           const toml::array* keys = node.as_array();
@@ -133,25 +136,12 @@ FixedFace read_fixed(const TomlReader& reader, const toml::table& table, const s
   return fixed;
 }
 
-/// Reads a key and notes that it was there.
-Entry required_vector(const TomlReader& reader, const char* key, Eigen::Vector3d& value, bool& has) {
-  return {key, [&](const toml::node& node, const std::string& where) {
-            value = reader.vector(node, where);
-            has = true;
-          }};
-}
-
-[[noreturn]] void refuse_missing(const TomlReader& reader, const toml::table& table, const std::string& where,
-                                 const std::string& what) {
-  throw ConfigError(fmt::format("{}: {}: {}", reader.place(table), where, what));
-}
-
 PlainPointLoad read_point_load(const TomlReader& reader, const toml::table& table, const std::string& where) {
   PlainPointLoad load;
   bool has_at = false, has_force = false;
-  reader.read_table(table, where,
-                    {required_vector(reader, "at", load.at, has_at),
-                     required_vector(reader, "force", load.force, has_force)});
+  reader.read_table(
+      table, where,
+      {noted_vector(reader, "at", load.at, has_at), noted_vector(reader, "force", load.force, has_force)});
   if (!has_at) refuse_missing(reader, table, where, "at: missing, expected three coordinates in metres");
   if (!has_force) refuse_missing(reader, table, where, "force: missing, expected three numbers in newtons");
   return load;
@@ -161,8 +151,8 @@ PlainBodyLoad read_body_load(const TomlReader& reader, const toml::table& table,
   PlainBodyLoad load;
   bool has_density = false, has_acceleration = false;
   reader.read_table(table, where,
-                    {required_vector(reader, "density", load.density, has_density),
-                     required_vector(reader, "acceleration", load.acceleration, has_acceleration)});
+                    {noted_vector(reader, "density", load.density, has_density),
+                     noted_vector(reader, "acceleration", load.acceleration, has_acceleration)});
   if (!has_density && !has_acceleration)
     refuse_missing(reader, table, where,
                    "no load, expected density (N/m^3) or acceleration (m/s^2); hint: density = [0, -100, 0]");
@@ -180,7 +170,7 @@ PlainFaceLoad read_face_load(const TomlReader& reader, const toml::table& table,
                         load.pressure = reader.number(node, at);
                         has_pressure = true;
                       }},
-                     required_vector(reader, "traction", load.traction, has_traction)});
+                     noted_vector(reader, "traction", load.traction, has_traction)});
   if (!face)
     refuse_missing(reader, table, where, "face: missing, expected a side of the box; hint: face = \"x-max\"");
   if (!has_pressure && !has_traction)
@@ -195,8 +185,8 @@ PlainVelocity read_velocity(const TomlReader& reader, const toml::table& table) 
   PlainVelocity velocity;
   bool has_linear = false, has_spin = false;
   reader.read_table(table, "velocity",
-                    {required_vector(reader, "linear", velocity.linear, has_linear),
-                     required_vector(reader, "spin", velocity.spin, has_spin),
+                    {noted_vector(reader, "linear", velocity.linear, has_linear),
+                     noted_vector(reader, "spin", velocity.spin, has_spin),
                      {"about", [&](const toml::node& node, const std::string& at) {
                         velocity.about = reader.vector(node, at);
                       }}});
@@ -214,32 +204,23 @@ std::vector<std::string> plain_scene_keys() {
 
 void read_plain_scene(const TomlReader& reader, const std::string& key, const toml::node& node,
                       PlainScene& plain) {
-  const auto tables = [&](const auto& read) {
-    reader.read_tables(node, key,
-                       [&](const toml::table& table, const std::string& where) { read(table, where); });
+  const auto read_all = [&](auto& list, const auto& read) {
+    reader.read_tables(node, key, [&](const toml::table& table, const std::string& where) {
+      list.push_back(read(reader, table, where));
+    });
   };
   if (key == "lattice") {
     read_box(reader, reader.table(node, reader.place(node) + ": lattice"), plain.box);
   } else if (key == "bone") {
-    tables([&](const auto& table, const auto& where) {
-      plain.bones.push_back(read_bone(reader, table, where));
-    });
+    read_all(plain.bones, read_bone);
   } else if (key == "fixed") {
-    tables([&](const auto& table, const auto& where) {
-      plain.fixed.push_back(read_fixed(reader, table, where));
-    });
+    read_all(plain.fixed, read_fixed);
   } else if (key == "point_load") {
-    tables([&](const auto& table, const auto& where) {
-      plain.point_loads.push_back(read_point_load(reader, table, where));
-    });
+    read_all(plain.point_loads, read_point_load);
   } else if (key == "body_load") {
-    tables([&](const auto& table, const auto& where) {
-      plain.body_loads.push_back(read_body_load(reader, table, where));
-    });
+    read_all(plain.body_loads, read_body_load);
   } else if (key == "face_load") {
-    tables([&](const auto& table, const auto& where) {
-      plain.face_loads.push_back(read_face_load(reader, table, where));
-    });
+    read_all(plain.face_loads, read_face_load);
   } else if (key == "velocity") {
     plain.velocity = read_velocity(reader, reader.table(node, reader.place(node) + ": velocity"));
   }
