@@ -66,7 +66,8 @@ std::string hash_of(std::string_view text) {
 void add_options(Hash& hash, const lattice::BuildOptions& options) {
   // Fails to compile where a field is added: add it here, too.
   const auto& [cells, cell_size, size_factors, coarsen_rigid, include, exclude, tip_bones, symmetry,
-               construction, max_retries, min_dihedral_degrees, min_scaled_jacobian] = options;
+               construction, max_retries, min_dihedral_degrees, min_scaled_jacobian, poll] = options;
+  static_cast<void>(poll);  // makes no difference to what is built
   hash.add(cells);
   hash.add(cell_size ? 1 : 0);
   hash.add(cell_size.value_or(0.0));
@@ -112,6 +113,7 @@ std::string facts_of(const lattice::BuildResult& result) {
   for (const lattice::RefusedAttempt& attempt : result.refused)
     json["refused"].push_back(Json::array({attempt.name, to_json(attempt.failures)}));
   json["no_mirror"] = result.no_mirror;
+  json["idle_sizes"] = result.idle_sizes;
   if (result.mirror) {
     const Eigen::Vector3d& n = result.mirror->normal;
     json["mirror"] = {n.x(), n.y(), n.z(), result.mirror->offset};
@@ -137,6 +139,7 @@ void take_facts(const std::string& text, lattice::BuildResult& result) {
   for (const Json& attempt : json.at("refused"))
     result.refused.push_back({attempt.at(0).get<std::string>(), failures_from(attempt.at(1))});
   result.no_mirror = json.at("no_mirror").get<std::string>();
+  result.idle_sizes = json.at("idle_sizes").get<std::vector<int>>();
   if (json.contains("mirror")) {
     const Json& plane = json.at("mirror");
     const auto number = [&](std::size_t i) { return plane.at(i).get<double>(); };

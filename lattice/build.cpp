@@ -40,13 +40,17 @@ struct Draft {
   Tetrahedra cells;
 };
 
-Halves halves(const RigInput& input) { return input.mirror ? Halves::OneMirrored : Halves::Both; }
+SkinSamples samples_of(const RigInput& input, double h) {
+  return sample_skin(input.unit_skin, h, input.mirror ? Halves::OneMirrored : Halves::Both, input.sizes,
+                     input.poll);
+}
 
 Draft make_draft(const RigInput& input, double h, const Attempt& attempt, const SkinSamples& samples) {
   ReductionOptions reduction = attempt.reduction;
   reduction.sizes = &input.sizes;
   PointOptions options = attempt.points;
   options.sizes = &input.sizes;
+  options.poll = input.poll;
   Draft draft;
   draft.skeleton =
       reduce_skeleton(input.unit_skin, input.unit_joints, input.weights, h, reduction, input.mirror_joint());
@@ -75,8 +79,7 @@ double find_edge_length(const RigInput& input, int wanted, const Attempt& attemp
   double old_x = 0.0, old_y = 0.0, slope = -2.3;  // cells go like h^-3 in a bulk, h^-2 in a skin
   for (int step = 0; step < kSearchSteps; ++step) {
     const double h = std::exp(x);
-    const Draft draft =
-        make_draft(input, h, attempt, sample_skin(input.unit_skin, h, halves(input), input.sizes));
+    const Draft draft = make_draft(input, h, attempt, samples_of(input, h));
     const std::size_t cells = draft.cells.size() * (draft.points.half ? 2 : 1);
     const double y = std::log(static_cast<double>(std::max<std::size_t>(1, cells)));
     if (std::abs(y - target) < best_error) best_error = std::abs(y - target), best_x = x;
@@ -147,7 +150,8 @@ ControlLattice to_lattice(const RigInput& input, const Draft& draft, double h) {
   return lattice;
 }
 
-/// [m], over the cells.
+/// Mean over the cells of the target edge at their middles [m], where `h` is that of a factor of 1 (unit
+/// coordinates).
 double mean_target_edge(const RigInput& input, const ControlLattice& lattice, double h) {
   double sum = 0.0;
   for (const Cell& cell : lattice.complex.cells) {
@@ -159,9 +163,9 @@ double mean_target_edge(const RigInput& input, const ControlLattice& lattice, do
 }
 
 ControlLattice make_attempt(const RigInput& input, double h, const Attempt& attempt) {
-  const SkinSamples samples = sample_skin(input.unit_skin, h, halves(input), input.sizes);
+  const SkinSamples samples = samples_of(input, h);
   Draft draft = make_draft(input, h, attempt, samples);
-  optimise(draft.points, draft.cells, draft.skeleton, input.unit_skin, samples, h, input.sizes);
+  optimise(draft.points, draft.cells, draft.skeleton, input.unit_skin, samples, h, input.sizes, input.poll);
   if (draft.points.half) add_mirror_image(draft);
   ControlLattice lattice = to_lattice(input, draft, h);
   separate_limbs(input, draft.skeleton, lattice);
@@ -195,7 +199,7 @@ bool is_better(const Outcome& a, const Outcome& b, const BuildOptions& options) 
 Outcome judged(ControlLattice lattice, const RigInput& input, const BuildOptions& options) {
   Outcome outcome;
   outcome.lattice = std::move(lattice);
-  outcome.found = inspect(outcome.lattice, input.skin, input.unit_skin);
+  outcome.found = inspect(outcome.lattice, input.skin, input.unit_skin, input.poll);
   outcome.lattice.quality = outcome.found.quality;
   outcome.failures = judge(outcome.found, options);
   return outcome;
@@ -208,7 +212,7 @@ Outcome try_out(const RigInput& input, double h, const Attempt& attempt, const B
 /// The last resort: cubes, and soft bones.
 Outcome try_grid(const RigInput& input, const BuildOptions& options) {
   const double side = options.cell_size ? *options.cell_size / input.unit_skin.scale
-                                        : find_grid_side(input.unit_skin, options.cells);
+                                        : find_grid_side(input.unit_skin, options.cells, input.poll);
   ReductionOptions reduction;
   reduction.tip_bones = options.tip_bones;
   return judged(hexahedral_lattice(input, side, reduction), input, options);
@@ -232,6 +236,14 @@ void try_other_grids(const RigInput& input, double h, const BuildOptions& option
         is_better(other, best, options))
       best = std::move(other);
   }
+}
+
+/// In ascending order.
+std::vector<int> sized_joints(const BuildOptions& options) {
+  std::vector<int> joints;
+  for (const SizeFactor& size : options.size_factors) joints.push_back(size.joint);
+  std::sort(joints.begin(), joints.end());
+  return joints;
 }
 
 /// The first attempt that passes, or the best of all.
@@ -273,6 +285,7 @@ BuildResult best_attempt_of(const RigInput& input, const BuildOptions& options) 
   result.failures = std::move(best->failures);
   result.lattice.retries = static_cast<int>(result.refused.size()) - (result.failures.empty() ? 0 : 1);
   result.no_mirror = input.no_mirror;
+  result.idle_sizes = result.lattice.is_grid ? sized_joints(options) : input.idle_sizes;
   if (input.mirror) {
     const Eigen::Vector3d normal = input.unit_skin.axes.row(0).transpose();
     result.mirror = MirrorPlane{normal, normal.dot(input.unit_skin.centre)};
@@ -291,6 +304,7 @@ BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptio
     BuildResult result;
     result.lattice = std::move(grid.lattice);
     result.failures = std::move(grid.failures);
+    result.idle_sizes = sized_joints(options);
     return result;
   }
   const RigInput input = make_rig_input(skin, joints, options);

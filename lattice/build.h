@@ -7,6 +7,7 @@
 
 #include "lattice/control_lattice.h"
 #include "lattice/mirror_map.h"
+#include "lattice/poll.h"
 #include "lattice/surface.h"
 
 namespace sinew::lattice {
@@ -42,7 +43,7 @@ struct BuildOptions {
   std::optional<double> cell_size = std::nullopt;
   /// Finer and coarser places. A joint may be named once. Away from a finer place the target edge grows by
   /// 0.35 per length, so that neighbouring cells differ little. Of no effect at joints that carry no skin and
-  /// where only a grid of cubes passes the gate.
+  /// where only a grid of cubes passes the gate: BuildResult::idle_sizes.
   std::vector<SizeFactor> size_factors = {};
   /// With On, skin that follows one frame alone, and the flesh under it, gets cells twice as large as
   /// `size_factors` say, the farther from joints and blended weights the nearer to that. Off, as such skin
@@ -66,6 +67,8 @@ struct BuildOptions {
   /// Gate thresholds.
   double min_dihedral_degrees = 10.0;
   double min_scaled_jacobian = 0.10;
+  /// Asked during the build whether to go on; no part of what is built.
+  Poll poll = {};
 
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;
@@ -97,12 +100,13 @@ struct BuildResult {
   std::vector<RefusedAttempt> refused;  ///< in order; with a lattice that failed, all attempts.
   std::optional<MirrorPlane> mirror;    ///< in which the lattice is its own mirror image to 1e-9 of its size.
   std::string no_mirror;                ///< why it is not, one phrase; empty where it is.
+  std::vector<int> idle_sizes;          ///< joints of `size_factors` that nothing is sized at.
 };
 
 /// Builds a lattice of tetrahedra round `skin` in which the bones of `joints` are chains of edges; where the
 /// gate refuses every attempt, a plain grid of cubes with soft bones.
 /// Deterministic. `skin.weights` name joints of the tree. Throws std::invalid_argument where there is no
-/// triangle, no joint or no weight at all, or a coordinate is not finite.
+/// triangle, no joint or no weight at all, or a coordinate is not finite, and whatever `options.poll` throws.
 BuildResult build(const Surface& skin, const JointTree& joints, const BuildOptions& options = {});
 
 /// What a program that builds, checks and writes so many cells takes of memory at its peak [bytes], without

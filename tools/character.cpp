@@ -14,6 +14,7 @@
 #include "assets/lattice_files.h"
 #include "fem/default_material.h"
 #include "tools/failure.h"
+#include "tools/interrupt.h"
 #include "tools/lattice_memory.h"
 #include "tools/plain_character.h"
 #include "tools/plain_loads.h"
@@ -87,12 +88,11 @@ fem::Material material_of(const fem::BodyOptions& body, int joint) {
 /// A pull must reach some flesh, and soft bones are held by nothing else.
 void check_pull(const Character& c, const lattice::LatticeBone& bone, const BoneMaterial& material,
                 const std::string& where) {
-  const double least = 0.25 * c.lattice.lattice.edge_length;
+  const double least = fem::smallest_radius(bone, c.lattice.lattice.edge_length);
   if (material.radius && *material.radius < least) {
     throw assets::ConfigError(
         fmt::format("{}: radius: got {}, expected at least {:.3g} m, a quarter of the lattice's edge, at "
-                    "bone '{}'; hint: "
-                    "more cells",
+                    "bone '{}'; hint: more cells",
                     where, *material.radius, least, bone.name));
   }
   if (bone.soft && material.stiffness && !(*material.stiffness > 0.0)) {
@@ -232,7 +232,26 @@ lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::s
     for (const int joint : joints_of(scene.sizes[i].bones, joints, fmt::format("size {}", i + 1)))
       factors[joint] = scene.sizes[i].factor;
   for (const auto& [joint, factor] : factors) options.size_factors.push_back({joint, factor});
+  options.poll.ask = [] { stop_if_interrupted("while building the lattice"); };
   return options;
+}
+
+void warn_of_idle_sizes(const lattice::BuildResult& result, const std::vector<std::string>& joints,
+                        const Talk& talk) {
+  constexpr std::size_t kMostShown = 8;
+  if (result.idle_sizes.empty()) return;
+  if (result.lattice.is_grid) {
+    talk("warning: [[size]]: does nothing, as all cells of a grid of cubes are of one size");
+    return;
+  }
+  std::vector<std::string> shown;
+  for (const int joint : result.idle_sizes) {
+    if (shown.size() == kMostShown) break;
+    shown.push_back("'" + joints[static_cast<std::size_t>(joint)] + "'");
+  }
+  const std::size_t more = result.idle_sizes.size() - shown.size();
+  talk(fmt::format("warning: [[size]]: no skin hangs on {}{}, so that nothing is sized there",
+                   fmt::join(shown, ", "), more == 0 ? "" : fmt::format(" and {} more", more)));
 }
 
 namespace {
@@ -268,6 +287,7 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
     }
   }
   report_lattice(scene, c.lattice, talk);
+  warn_of_idle_sizes(c.lattice, c.input.joints.names, talk);
 }
 
 /// What a model or a scene cannot do with what drives the flesh.

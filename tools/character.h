@@ -50,8 +50,12 @@ void settle_flesh(const Scene& scene, Character& character);
 assets::ReadLatticeOptions read_options(const Scene& scene, const assets::Rig& rig);
 
 /// The builder's options for a scene and the names of a rig's joints. Throws assets::ConfigError for a
-/// pattern that fits no joint, naming the nearest.
+/// pattern that fits no joint, naming the nearest. A build with them throws Interrupted when a signal came.
 lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::string>& joints);
+
+/// Says which joints the scene sizes cells at in vain.
+void warn_of_idle_sizes(const lattice::BuildResult& result, const std::vector<std::string>& joints,
+                        const Talk& talk);
 
 /// The flesh of the character. Throws assets::InputError naming the rig where the lattice cannot carry it.
 fem::Body make_body(const Character& character);

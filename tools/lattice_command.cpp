@@ -194,6 +194,8 @@ assets::CachedBuild make_lattice(const Scene& scene, const assets::Rig& rig,
     built = assets::build_lattice(folder, input.skin.surface, input.joints, options);
     if (built.use == assets::CacheUse::Hit)
       fmt::print(stderr, "lattice: nothing changed, taken from {}\n", single_line(folder));
+    warn_of_idle_sizes(built.result, input.joints.names,
+                       [](const std::string& line) { fmt::print(stderr, "{}\n", single_line(line)); });
   } catch (const std::invalid_argument& error) {
     throw assets::InputError(scene.rig, error.what());
   }
@@ -244,7 +246,9 @@ void write_outputs(const LatticeRequest& request, Character& character) {
     assets::LatticePictureOptions picture;
     picture.caption = fmt::format("{}: lattice of {} cells", std::filesystem::path(scene.rig).stem().string(),
                                   lattice.complex.cells.size());
+    stop_if_interrupted("before drawing the lattice");
     const assets::Image image = assets::render_lattice(lattice, character.input.skin.surface, picture);
+    stop_if_interrupted("before writing the lattice");
     assets::write_file(picture_name(request), assets::png_bytes(image), overwrite);
   }
   try {
@@ -269,11 +273,11 @@ void run_lattice(const LatticeRequest& request) {
   character.clip = clip_of(scene, character.rig);
   character.input = assets::lattice_input(character.rig);
   const lattice::JointTree& joints = character.input.joints;
-  if (scene.lattice.empty()) check_lattice_memory(scene, character.input.skin.surface);
   stop_if_interrupted("before building the lattice");
+  if (scene.lattice.empty()) check_lattice_memory(scene, character.input.skin.surface);
   assets::CachedBuild built = make_lattice(scene, character.rig, character.input);
   character.lattice = std::move(built.result);
-  stop_if_interrupted("before writing the lattice");
+  stop_if_interrupted("after building the lattice");
   write_outputs(request, character);
   if (built.use == assets::CacheUse::Built)
     assets::keep_lattice(assets::cache_folder(scene.output), built.key, character.lattice, joints);

@@ -116,6 +116,14 @@ double CellSizes::edge_at(const Vector3d& p, double h) const {
   return edge;
 }
 
+std::vector<int> idle_sizes(const JointWeights& weights, const BuildOptions& options) {
+  std::vector<int> joints;
+  for (const SizeFactor& size : options.size_factors)
+    if (!(weights.area[size.joint] > 0.0)) joints.push_back(size.joint);
+  std::sort(joints.begin(), joints.end());
+  return joints;
+}
+
 CellSizes sizes_of_joints(const UnitSkin& skin, const JointTree& unit_joints, const JointWeights& weights,
                           const std::vector<int>& stand_in, const BuildOptions& options) {
   const bool coarsen = options.coarsen_rigid == CoarsenRigid::On;

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "lattice/build.h"
-#include "lattice/detail/skeleton_reduction.h"
+#include "lattice/detail/joint_weights.h"
 #include "lattice/detail/unit_skin.h"
 
 namespace sinew::lattice::detail {
@@ -17,20 +17,23 @@ class CellSizes {
   /// Growth of the target edge per length: the cell behind a cell of edge e has an edge of about 1.35 e.
   static constexpr double kGrowth = 0.35;
 
-  CellSizes() = default;  ///< h everywhere.
-  /// `factor_of_vertex`: per welded point of the skin; `segments` are further flesh.
+  /// Flesh along a segment.
   struct Flesh {
     double factor = 1.0;
-    Eigen::Vector3d a, b;  ///< a segment.
+    Eigen::Vector3d a, b;  ///< its ends.
   };
+
+  CellSizes() = default;  ///< h everywhere.
+  /// `factor_of_vertex`: per welded point of the skin; `segments` are further flesh.
   CellSizes(const UnitSkin& skin, const std::vector<double>& factor_of_vertex,
             const std::vector<Flesh>& segments);
 
   bool is_uniform() const { return largest_ == 1.0 && finer_.empty(); }
   /// Target edge at p where that of flesh with a factor of 1 is h.
   double edge_at(const Eigen::Vector3d& p, double h) const;
-  double smallest() const { return finer_.empty() ? largest_ : finer_.front().factor; }  ///< factor.
-  double largest() const { return largest_; }                                            ///< factor.
+  /// The extreme factors.
+  double smallest() const { return finer_.empty() ? largest_ : finer_.front().factor; }
+  double largest() const { return largest_; }
 
  private:
   struct Place {
@@ -40,6 +43,9 @@ class CellSizes {
   std::vector<Place> finer_;  ///< all but the coarsest flesh, by factor.
   double largest_ = 1.0;
 };
+
+/// The joints of options.size_factors that no skin hangs on, ascending: excluded ones are among them.
+std::vector<int> idle_sizes(const JointWeights& weights, const BuildOptions& options);
 
 /// The sizes that the options ask for. `stand_in` says for every joint which one its skin counts for.
 CellSizes sizes_of_joints(const UnitSkin& skin, const JointTree& unit_joints, const JointWeights& weights,

@@ -12,7 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Points farther from the skin than this are in no cell that touches it: as on the regular grid.
+/// Points farther from the skin than this, in target edges there, are in no cell that touches it: more than
+/// on the regular grid, as edges are longer where the crystal is dislocated.
 constexpr double kReach = 1.5;
 /// A point keeps this distance from all others, in target edges there.
 constexpr double kRoom = 0.8;
@@ -53,24 +54,23 @@ class TakenPoints {
 
 class Crystal {
  public:
-  Crystal(const UnitSkin& skin, const BoneClearance& clearance, const CellSizes& sizes, double h,
+  Crystal(const UnitSkin& skin, const BoneClearance& clearance, double h, const PointOptions& options,
           LatticePoints& out)
       : skin_(skin),
         clearance_(clearance),
-        sizes_(sizes),
+        options_(options),
         h_(h),
         out_(out),
-        far_(skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() + kReach * h * sizes.largest()),
-        taken_(h * std::sqrt(sizes.smallest() * sizes.largest())) {}
-
-  double edge_at(const Vector3d& p) const { return sizes_.edge_at(p, h_); }
-  const Vector3d& far() const { return far_; }
+        far_(skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() +
+             kReach * h * options.sizes->largest()),
+        taken_(h * std::sqrt(options.sizes->smallest() * options.sizes->largest())) {}
 
   /// Takes p where there is room, and all that grows from it.
   void grow_from(const Vector3d& p, double room) {
     std::vector<Vector3d> open;
     take(p, room, open);
     for (std::size_t i = 0; i < open.size(); ++i) {
+      options_.poll();
       const Vector3d from = open[i];
       const double edge = edge_at(from);
       for (int n = 0; n < 8; ++n) {
@@ -82,6 +82,8 @@ class Crystal {
   }
 
  private:
+  double edge_at(const Vector3d& p) const { return options_.edge_at(p, h_); }
+
   void take(Vector3d p, double room, std::vector<Vector3d>& open) {
     if ((p.cwiseAbs().array() > far_.array()).any()) return;
     const double edge = edge_at(p);
@@ -98,7 +100,7 @@ class Crystal {
 
   const UnitSkin& skin_;
   const BoneClearance& clearance_;
-  const CellSizes& sizes_;
+  const PointOptions& options_;
   double h_;
   LatticePoints& out_;
   Vector3d far_;
@@ -107,11 +109,11 @@ class Crystal {
 
 }  // namespace
 
-void place_graded_points(const UnitSkin& skin, const BoneClearance& clearance, const CellSizes& sizes,
-                         double h, double shift, LatticePoints& out) {
-  Crystal crystal(skin, clearance, sizes, h, out);
+void place_graded_points(const UnitSkin& skin, const BoneClearance& clearance, double h,
+                         const PointOptions& options, LatticePoints& out) {
+  Crystal crystal(skin, clearance, h, options, out);
   // One crystal for all that hangs together, from the middle of the skin's box; others for what is left.
-  Vector3d middle = Vector3d::Constant(shift * 2.0 * h * sizes.largest() / std::sqrt(3.0));
+  Vector3d middle = Vector3d::Constant(options.shift * 2.0 * h * options.sizes->largest() / std::sqrt(3.0));
   if (out.half) middle.x() = 0.0;
   Eigen::Index nearest = 0;
   (skin.points.rowwise() - middle.transpose()).rowwise().squaredNorm().minCoeff(&nearest);

@@ -45,7 +45,7 @@ bool overlaps_cube(const Vector3d& a, const Vector3d& b, const Vector3d& c, doub
 /// Which cubes of the grid over the skin's box are kept.
 class Grid {
  public:
-  Grid(const UnitSkin& skin, double side) : side_(side) {
+  Grid(const UnitSkin& skin, double side, const Poll& poll) : side_(side) {
     const Vector3d low = skin.points.colwise().minCoeff(), high = skin.points.colwise().maxCoeff();
     // Room for the skin to touch the outermost cubes from inside.
     count_ = ((high - low) / side + Vector3d::Constant(1e-3)).array().ceil().cast<int>().max(1);
@@ -53,6 +53,7 @@ class Grid {
     keep_.assign(static_cast<std::size_t>(count_.x()) * count_.y() * count_.z(), 0);
     for (int t = 0; t < skin.triangles.rows(); ++t) keep_touched(skin, t);
     for_each([&](const Vector3i& at) {
+      if (at.x() == 0) poll();
       std::uint8_t& keep = keep_[index(at)];
       if (!keep && skin.is_inside(middle(at))) keep = 1;
     });
@@ -106,8 +107,8 @@ class Grid {
 
 }  // namespace
 
-CellComplex grid_over_skin(const UnitSkin& skin, double side) {
-  const Grid grid(skin, side);
+CellComplex grid_over_skin(const UnitSkin& skin, double side, const Poll& poll) {
+  const Grid grid(skin, side, poll);
   CellComplex complex;
   std::vector<Vector3d> points;
   const Vector3i corners = grid.count() + Vector3i::Ones();
@@ -134,7 +135,7 @@ CellComplex grid_over_skin(const UnitSkin& skin, double side) {
   return complex;
 }
 
-double find_grid_side(const UnitSkin& skin, int cells) {
+double find_grid_side(const UnitSkin& skin, int cells, const Poll& poll) {
   // The count falls with the side, but not steadily: cubes jump as the grid shifts.
   const Vector3d box = skin.points.colwise().maxCoeff() - skin.points.colwise().minCoeff();
   double low = 0.5;
@@ -143,7 +144,7 @@ double find_grid_side(const UnitSkin& skin, int cells) {
   for (int step = 0; step < kSearchSteps && best_error > kCloseEnough; ++step) {
     // From the coarse side, so that no grid is much finer than the one wanted.
     const double side = std::max(std::sqrt(low * high), 0.5 * high);
-    const double error = std::log(static_cast<double>(Grid(skin, side).num_kept()) / cells);
+    const double error = std::log(static_cast<double>(Grid(skin, side, poll).num_kept()) / cells);
     if (std::abs(error) < best_error) best = side, best_error = std::abs(error);
     (error > 0.0 ? low : high) = side;
   }
@@ -156,7 +157,7 @@ ControlLattice hexahedral_lattice(const RigInput& input, double side, const Redu
   ControlLattice lattice;
   lattice.is_grid = true;
   lattice.edge_length = side * input.unit_skin.scale;
-  lattice.complex = grid_over_skin(input.unit_skin, side);
+  lattice.complex = grid_over_skin(input.unit_skin, side, input.poll);
   lattice.changes = skeleton.changes;
   for (ReducedBone& bone : skeleton.bones) {
     if (bone.soft) continue;

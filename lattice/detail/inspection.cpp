@@ -241,12 +241,15 @@ std::vector<std::vector<int>> floating_components(const ControlLattice& lattice)
   return floating;
 }
 
-Inspection inspect(const ControlLattice& lattice, const Surface& skin, const UnitSkin& unit) {
+Inspection inspect(const ControlLattice& lattice, const Surface& skin, const UnitSkin& unit,
+                   const Poll& poll) {
   const CellComplex& complex = lattice.complex;
   if (complex.cells.empty()) throw std::invalid_argument("lattice: there is no cell");
   const double size = (complex.points.colwise().maxCoeff() - complex.points.colwise().minCoeff()).maxCoeff();
   Inspection out;
+  poll();
   measure_cells(lattice, out);
+  poll();
   const double volume = skin_volume(unit);
   out.quality.volume_ratio =
       volume > 0.0 ? out.quality.volume_ratio / volume : std::numeric_limits<double>::infinity();
@@ -254,14 +257,18 @@ Inspection inspect(const ControlLattice& lattice, const Surface& skin, const Uni
   SkinInCells places(lattice, skin);
   std::vector<bool> vertex_outside(skin.points.rows(), false);
   for (int v = 0; v < skin.points.rows(); ++v) {
+    poll();
     if (places.is_inside(v)) continue;
     vertex_outside[v] = true;
     out.vertices_outside.push_back(v);
   }
   out.quality.skin_vertices_outside = static_cast<int>(out.vertices_outside.size());
+  poll();
   out.triangles_outside = find_triangles_outside(complex, skin, places, vertex_outside, size);
   out.quality.skin_triangles_outside = static_cast<int>(out.triangles_outside.size());
+  poll();
   find_broken_chains(lattice, size, out);
+  poll();
   out.floating = floating_components(lattice);
   out.quality.components = static_cast<int>(components(complex).size());
   out.quality.components_without_bone = static_cast<int>(out.floating.size());

@@ -21,8 +21,11 @@ struct Inspection {
   /// Components without bone or soft frame: the cells of each.
   std::vector<std::vector<int>> floating;
 };
-/// `unit` is the same skin cleaned; it serves the volume.
-Inspection inspect(const ControlLattice& lattice, const Surface& skin, const UnitSkin& unit);
+
+/// `unit` is the same skin cleaned; it serves the volume. Throws std::invalid_argument where there is no
+/// cell.
+Inspection inspect(const ControlLattice& lattice, const Surface& skin, const UnitSkin& unit,
+                   const Poll& poll = {});
 
 /// The gate on what was found.
 std::vector<GateFailure> judge(const Inspection& inspection, const BuildOptions& options);

@@ -144,7 +144,7 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
   place_bones(skeleton, h, options, out);
   const BoneClearance clearance(out, h, options);
   if (!options.is_uniform()) {
-    place_graded_points(skin, clearance, *options.sizes, h, options.shift, out);
+    place_graded_points(skin, clearance, h, options, out);
     return out;
   }
   // Cubes of side 2h/sqrt(3) with a point in the middle: neighbours along a diagonal are h apart.
@@ -155,7 +155,8 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
   if (out.half) shift.x() = 0.0;
   const Eigen::Vector3i count = (2.0 * reach / side).array().ceil().cast<int>() + 1;
   for (int i = out.half ? 0 : -count.x(); i <= count.x(); ++i)
-    for (int j = -count.y(); j <= count.y(); ++j)
+    for (int j = -count.y(); j <= count.y(); ++j) {
+      options.poll();
       for (int k = -count.z(); k <= count.z(); ++k) {
         if ((i - j) % 2 != 0 || (j - k) % 2 != 0) continue;  // all even or all odd
         const Vector3d p = 0.5 * side * Vector3d(i, j, k) + shift;
@@ -164,6 +165,7 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
         if (!skin.query.is_within(p, near) && !skin.is_inside(p)) continue;
         if (!clearance.is_too_close(p)) out.add(p, {});
       }
+    }
   return out;
 }
 

@@ -41,6 +41,7 @@ struct PointOptions {
   double exclusion = 0.62;           ///< in units of min(h, max(l, h/2)), l the length of the bone piece.
   double shift = 0.0;                ///< of the grid, along all axes, in units of the side of its cubes.
   const CellSizes* sizes = nullptr;  ///< h of every place; null: the same everywhere.
+  Poll poll = {};
 
   double edge_at(const Eigen::Vector3d& p, double h) const {
     return sizes == nullptr ? h : sizes->edge_at(p, h);

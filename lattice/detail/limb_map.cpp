@@ -23,8 +23,8 @@ using Eigen::Vector3d;
 constexpr double kLimbDistance = 1.5;
 constexpr double kSoftBoneSpacing = 0.25;  ///< of the points along soft bones, in units of h.
 constexpr double kInsideSlack = 1e-9;
-constexpr double kSamePlace = 1e-9;  ///< of a vertex and the image of its partner, unit coordinates.
-constexpr double kGridSide = 0.5;    ///< of the grid of triangles, in units of h.
+constexpr double kImageTolerance = 1e-9;  ///< of a vertex and the image of its partner, unit coordinates.
+constexpr double kGridSide = 0.5;         ///< of the grid of triangles, in units of h.
 
 bool is_before(const LimbPiece& a, const LimbPiece& b) {
   return std::tie(a.frame, a.stretch.bone) < std::tie(b.frame, b.stretch.bone);
@@ -104,8 +104,10 @@ LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const C
   label_skin(labels, faces);
   label_bones(labels);
   if (input.mirror) mirror(labels);
-  for (std::size_t c = 0; c < labels.size(); ++c)
+  for (std::size_t c = 0; c < labels.size(); ++c) {
+    input_.poll();
     limbs_.push_back(gather(labels[c], edge_at(lattice.complex.cells[c].vertices)));
+  }
 }
 
 LimbPiece LimbMap::piece_at(int frame, const Vector3d& p) const {
@@ -164,6 +166,7 @@ void LimbMap::label_skin(std::vector<Label>& labels, const std::vector<CellFace>
     }
   const TriangleGrid grid(corners_of(skin), kGridSide * h_);
   for (const CellFace& face : faces) {
+    input_.poll();
     const int n = face.vertices[3] < 0 ? 3 : 4;
     std::array<Vector3d, 4> corners;
     Vector3d mean = Vector3d::Zero();
@@ -244,7 +247,7 @@ void LimbMap::mirror(std::vector<Label>& labels) const {
   const PointFinder finder(points);
   std::vector<int> vertex;
   for (Eigen::Index v = 0; v < points.rows(); ++v)
-    vertex.push_back(finder.first_near(reflected(points.row(v).transpose()), kSamePlace));
+    vertex.push_back(finder.first_near(reflected(points.row(v).transpose()), kImageTolerance));
   using Key = std::array<int, 8>;
   std::map<Key, std::size_t> cell_of;
   for (std::size_t c = 0; c < complex.cells.size(); ++c) {

@@ -30,7 +30,8 @@ constexpr int kHalvings = 3;
 class Optimiser {
  public:
   Optimiser(LatticePoints& points, const Tetrahedra& cells, const ReducedSkeleton& skeleton,
-            const UnitSkin& skin, const SkinSamples& samples, double h, const CellSizes& sizes)
+            const UnitSkin& skin, const SkinSamples& samples, double h, const CellSizes& sizes,
+            const Poll& poll)
       : mesh_(points.points, cells, points.half ? TetMesh::Half::PositiveX : TetMesh::Half::No),
         places_(points.places),
         skeleton_(skeleton),
@@ -39,6 +40,7 @@ class Optimiser {
         triangles_(samples.triangles),
         h_(h),
         sizes_(sizes),
+        poll_(poll),
         boundary_faces_(mesh_.boundary_faces()) {
     for (const std::vector<int>& chain : points.chains)
       for (std::size_t i = 1; i < chain.size(); ++i) bone_edges_.insert(std::minmax(chain[i - 1], chain[i]));
@@ -48,6 +50,7 @@ class Optimiser {
     for (int sweep = 0; sweep < kSweeps; ++sweep) {
       flip_sweep();
       for (int v = 0; v < static_cast<int>(mesh_.points.size()); ++v) {
+        poll_();
         if (mesh_.star(v).empty() || places_[v].fixed) continue;
         if (on_boundary(v) && places_[v].bone < 0) pull(v);
         climb(v);
@@ -76,6 +79,7 @@ class Optimiser {
   const TriangleGrid& triangles_;
   double h_;
   const CellSizes& sizes_;
+  const Poll& poll_;
   /// Per vertex the other two corners of its boundary faces. Flips and moves keep the faces.
   std::vector<std::vector<std::array<int, 2>>> boundary_faces_;
   EdgeSet bone_edges_;
@@ -89,8 +93,10 @@ void Optimiser::flip_sweep() {
     if (q < kGoodEnough) order.emplace_back(q, t);
   }
   std::sort(order.begin(), order.end());
-  for (const auto& [q, t] : order)
+  for (const auto& [q, t] : order) {
+    poll_();
     if (mesh_.is_alive(t)) flip(t);
+  }
 }
 
 bool Optimiser::flip(int t) {
@@ -194,8 +200,8 @@ void Optimiser::climb(int v) {
 }  // namespace
 
 void optimise(LatticePoints& points, Tetrahedra& cells, const ReducedSkeleton& skeleton, const UnitSkin& skin,
-              const SkinSamples& samples, double h, const CellSizes& sizes) {
-  Optimiser optimiser(points, cells, skeleton, skin, samples, h, sizes);
+              const SkinSamples& samples, double h, const CellSizes& sizes, const Poll& poll) {
+  Optimiser optimiser(points, cells, skeleton, skin, samples, h, sizes, poll);
   optimiser.run();
   points.points = std::move(optimiser.mesh().points);
   points.places = std::move(optimiser.places());

@@ -99,6 +99,7 @@ RigInput make_rig_input(const Surface& skin, const JointTree& joints, const Buil
   }
   weights.excluded = excluded;
   CellSizes sizes = sizes_of_joints(unit, unit_joints, weights, stand_in, options);
+  std::vector<int> idle = idle_sizes(weights, options);
   RigInput input{skin,
                  joints,
                  std::move(unit),
@@ -106,6 +107,8 @@ RigInput make_rig_input(const Surface& skin, const JointTree& joints, const Buil
                  std::move(weights),
                  std::move(stand_in),
                  std::move(sizes),
+                 std::move(idle),
+                 options.poll,
                  {},
                  std::move(search.why_not)};
   if (search.found) input.mirror = std::move(search.mirror);

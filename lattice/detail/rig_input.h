@@ -25,6 +25,8 @@ struct RigInput {
   /// Per joint the one that its skin weight counts for: itself unless it is excluded.
   std::vector<int> stand_in;
   CellSizes sizes;
+  std::vector<int> idle_sizes;  ///< joints of size_factors that no skin hangs on.
+  Poll poll;
   /// Found and wanted: unit coordinates have their plane at x = 0, and unit_joints are exact mirror images.
   std::optional<RigMirror> mirror;
   std::string no_mirror;  ///< why there is none.

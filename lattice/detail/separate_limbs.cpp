@@ -25,8 +25,12 @@ class Separation {
 
   void run() {
     number_instances();
-    for (const CellFace& face : faces_) link_of_face_.push_back(link(face));
+    for (const CellFace& face : faces_) {
+      input_.poll();
+      link_of_face_.push_back(link(face));
+    }
     split_vertices();
+    input_.poll();
     rebuild();
   }
 
@@ -206,6 +210,7 @@ void Separation::split_vertices() {
   std::vector<int> original;  // of each new vertex
   for (int v = 0; v < count; ++v) {
     if (!is_touched_[v]) continue;
+    input_.poll();
     const double edge = limbs_.edge_at({&v, 1});
     const std::vector<std::vector<int>> parts = parts_at(stars[v], faces_at[v], edge);
     // The vertex stays with every part of its bones' limbs; off the bones with the first part.

@@ -25,13 +25,15 @@ void visit_parts(const Vector3d& middle, double voxel, double h, const CellSizes
   }
 }
 
-void sample_inside(const UnitSkin& skin, double h, const CellSizes& sizes, std::vector<Vector3d>& out) {
+void sample_inside(const UnitSkin& skin, double h, const CellSizes& sizes, const Poll& poll,
+                   std::vector<Vector3d>& out) {
   const double voxel = kVoxel * h;
   const Vector3d low = skin.points.colwise().minCoeff(), high = skin.points.colwise().maxCoeff();
   const Eigen::Vector3i count = ((high - low) / voxel).array().ceil().cast<int>().max(1);
   const Vector3d first = 0.5 * (low + high) - 0.5 * voxel * (count.cast<double>() - Vector3d::Ones());
   for (int i = 0; i < count.x(); ++i)
-    for (int j = 0; j < count.y(); ++j)
+    for (int j = 0; j < count.y(); ++j) {
+      poll();
       for (int k = 0; k < count.z(); ++k) {
         const Vector3d p = first + voxel * Vector3d(i, j, k);
         if (sizes.is_uniform()) {
@@ -42,11 +44,13 @@ void sample_inside(const UnitSkin& skin, double h, const CellSizes& sizes, std::
           if (skin.is_inside(part)) out.push_back(part);
         });
       }
+    }
 }
 
 }  // namespace
 
-SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves, const CellSizes& sizes) {
+SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves, const CellSizes& sizes,
+                        const Poll& poll) {
   const bool fold = halves == Halves::OneMirrored;
   std::vector<Vector3d> points;
   for (int v = 0; v < skin.points.rows(); ++v) {
@@ -54,7 +58,7 @@ SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves, const Cel
     points.push_back(p);
     points.push_back(p + kShell * sizes.edge_at(p, h) * skin.normals[v]);
   }
-  sample_inside(skin, h, sizes, points);
+  sample_inside(skin, h, sizes, poll, points);
   std::vector<TriangleCorners> triangles;
   for (int t = 0; t < skin.triangles.rows(); ++t)
     triangles.push_back({skin.points.row(skin.triangles(t, 0)), skin.points.row(skin.triangles(t, 1)),

@@ -22,6 +22,7 @@ enum class Halves { Both, OneMirrored };
 
 /// Samples for target edge `h` (unit coordinates), denser where `sizes` make it smaller. With OneMirrored,
 /// those with x < 0 are mirrored to the other side.
-SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves, const CellSizes& sizes = {});
+SkinSamples sample_skin(const UnitSkin& skin, double h, Halves halves, const CellSizes& sizes = {},
+                        const Poll& poll = {});
 
 }  // namespace sinew::lattice::detail

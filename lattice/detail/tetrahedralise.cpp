@@ -21,7 +21,8 @@ using CellBase =
 using Delaunay =
     CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<VertexBase, CellBase>>;
 
-constexpr double kOffHull = 1e-9;  ///< from the plane of a half into it, unit coordinates.
+constexpr double kOffHull = 1e-9;         ///< from the plane of a half into it, unit coordinates.
+constexpr std::size_t kPollEvery = 1000;  ///< of points and samples.
 constexpr int kSplitRounds = 8;
 constexpr int kRelaxRounds = 4;
 constexpr double kRelaxReach = 2.0;  ///< free points this near a bone are relaxed, in units of h.
@@ -70,6 +71,7 @@ void relax(LatticePoints& points, const Triangulation& triangulation, double h, 
   std::vector<Vector3d> moved = points.points;
   std::vector<Delaunay::Vertex_handle> neighbours;
   for (std::size_t i = 0; i < points.points.size(); ++i) {
+    if (i % kPollEvery == 0) options.poll();
     const LatticePoints::Place& place = points.places[i];
     if (place.fixed || place.bone >= 0) continue;
     // Far from the bones a grid of one size is regular as it is.
@@ -153,11 +155,14 @@ void keep_crossed_cells(const LatticePoints& points, Delaunay& delaunay, const S
 }
 
 /// The cells that hold a sample, a piece of a skin triangle or an edge of a bone.
-Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const SkinSamples& samples) {
+Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const SkinSamples& samples,
+                const Poll& poll) {
   Delaunay& delaunay = triangulation.delaunay;
   for (auto c = delaunay.all_cells_begin(); c != delaunay.all_cells_end(); ++c) c->info() = false;
   Delaunay::Cell_handle hint;
-  for (const Vector3d& p : samples.points) {
+  for (std::size_t i = 0; i < samples.points.size(); ++i) {
+    if (i % kPollEvery == 0) poll();
+    const Vector3d& p = samples.points[i];
     hint = delaunay.locate(to_cgal(p), hint);
     if (delaunay.is_infinite(hint)) {
       // A point on the hull, as in the plane of a half, may be found outside, and beside any face of that
@@ -192,15 +197,18 @@ Tetrahedra cull(const LatticePoints& points, Triangulation& triangulation, const
 TetrahedraResult tetrahedralise(LatticePoints& points, const ReducedSkeleton& skeleton,
                                 const SkinSamples& samples, double h, const PointOptions& options) {
   TetrahedraResult result;
+  // A triangulation cannot be interrupted: a second for a million cells.
   for (int round = 0; round < kRelaxRounds; ++round) relax(points, Triangulation(points.points), h, options);
   for (int round = 0; round < kSplitRounds; ++round) {
+    options.poll();
     const int splits = split_missing_pieces(points, skeleton, Triangulation(points.points));
     result.splits += splits;
     if (splits == 0) break;
   }
+  options.poll();
   Triangulation triangulation(points.points);
   result.unfinished = unfinished_bones(points, triangulation);
-  result.cells = cull(points, triangulation, samples);
+  result.cells = cull(points, triangulation, samples, options.poll);
   return result;
 }
 

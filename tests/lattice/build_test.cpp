@@ -171,6 +171,31 @@ TEST(Build, MirrorsInAnyPlane) {
   expect_sound(result.lattice, legs);
 }
 
+// What stops a build comes from the poll alone, and while nothing stops it the poll changes nothing.
+TEST(Build, StopsWhereverThePollThrows) {
+  const tests::Character legs = tests::two_legs();
+  for (const Construction construction : {Construction::Tetrahedra, Construction::Grid}) {
+    long polls = 0;
+    BuildOptions options{.cells = 100, .construction = construction};
+    const BuildResult unwatched = build(legs.skin, legs.joints, options);
+    options.poll.ask = [&] { ++polls; };
+    const BuildResult watched = build(legs.skin, legs.joints, options);
+    EXPECT_EQ(watched.lattice.complex.points, unwatched.lattice.complex.points);
+    const long all = polls;
+    EXPECT_GT(all, watched.lattice.complex.points.rows()) << "nothing long goes without one";
+    struct Stop {};
+    for (const double share : {0.0, 0.2, 0.5, 0.8, 1.0}) {
+      const long last = 1 + std::lround(share * static_cast<double>(all - 1));
+      polls = 0;
+      options.poll.ask = [&] {
+        if (++polls == last) throw Stop();
+      };
+      EXPECT_THROW(build(legs.skin, legs.joints, options), Stop) << last << " of " << all;
+      EXPECT_EQ(polls, last) << "asked again after it had said no";
+    }
+  }
+}
+
 TEST(Build, SaysWhyALatticeIsNotMirrored) {
   tests::Character legs = tests::two_legs();
   EXPECT_EQ(build(legs.skin, legs.joints, {.cells = 150, .symmetry = Symmetry::Off}).no_mirror,
@@ -355,6 +380,7 @@ TEST(Build, RefusesWhatItCannotUse) {
             "size_factors: got 0.1, expected a factor in [0.25, 4]");
   EXPECT_EQ(message(arm(), {.size_factors = {{1, 0.5}, {1, 2.0}}}),
             "size_factors: got 1, expected every joint at most once");
+  EXPECT_EQ(message(arm(), {.size_factors = {{3, 0.5}}}), "size_factors: got joint 3, expected 0 ... 2");
   EXPECT_EQ(message(arm(), {.include = {7}}), "include: got joint 7, expected 0 ... 2");
   EXPECT_EQ(message(arm(), {.exclude = {0, 1, 2}}), "exclude: all 3 joints, expected at least one left");
 }

@@ -115,6 +115,23 @@ TEST(CellSizes, ChangeNothingWithFactorsOfOne) {
                    build(c.skin, c.joints, {.cells = 300, .size_factors = {{0, 1.0}, {2, 1.0}}}).lattice);
 }
 
+TEST(CellSizes, AreIdleAtJointsWithoutSkinAndInAGrid) {
+  tests::Character c = trunk();
+  const int bare = c.add_joint("bare", 1, {0, 1.0, 0.1});
+  BuildOptions options{.cells = 300, .size_factors = {{bare, 0.5}, {1, 0.5}, {2, 0.5}}};
+  const BuildResult sized = build(c.skin, c.joints, options);
+  EXPECT_EQ(sized.idle_sizes, std::vector<int>{bare});
+  options.size_factors = {{1, 0.5}, {2, 0.5}};
+  const BuildResult without = build(c.skin, c.joints, options);
+  EXPECT_THAT(without.idle_sizes, testing::IsEmpty());
+  expect_same_bits(sized.lattice, without.lattice);
+  options.exclude = {2};
+  EXPECT_EQ(build(c.skin, c.joints, options).idle_sizes, std::vector<int>{2}) << "its skin hangs on another";
+  options.exclude = {};
+  options.construction = Construction::Grid;
+  EXPECT_EQ(build(c.skin, c.joints, options).idle_sizes, (std::vector<int>{1, 2})) << "all cubes are alike";
+}
+
 TEST(CellSizes, DependOnNeitherUnitsNorTheOrderOfTriangles) {
   const tests::Character c = trunk();
   const BuildOptions options{.cells = 300, .size_factors = {{1, 0.5}}};

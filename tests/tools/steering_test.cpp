@@ -86,6 +86,27 @@ TEST_F(Steering, SaysWhyALopsidedLatticeIsNotMirrored) {
                         "image 'thigh_r'\n"));
 }
 
+// On the hopper's root hangs no skin; a lattice from the cache says so too.
+TEST_F(Steering, WarnsOfASizeWhereNoSkinHangs) {
+  std::ofstream(out("idle.toml"))
+      << "rig = \"" << SINEW_SOURCE_DIR "/assets/samples/hopper.glb"
+      << "\"\ncells = 100\n[[size]]\nbones = [\"root\", \"hips\"]\nfactor = 0.5\n";
+  const std::string warning = "warning: [[size]]: no skin hangs on 'root', so that nothing is sized there\n";
+  const std::string lattice = "lattice " + tests::quoted(out("idle.toml")) +
+                              " --preview off --overwrite -o " + tests::quoted(out("idle.vtu"));
+  for (const char* cached : {"", "lattice: nothing changed"}) {
+    const tests::Outcome run = tests::run(tests::command_line(lattice));
+    EXPECT_EQ(run.exit_code, 0) << run.text;
+    EXPECT_THAT(run.text, HasSubstr(cached));
+    EXPECT_THAT(run.text, HasSubstr(warning));
+  }
+  const tests::Outcome simulated = tests::run(tests::command_line(
+      "simulate " + tests::quoted(out("idle.toml")) +
+      " --levels 0 --settle 0 --frames 0-0 --preview off -o " + tests::quoted(out("run"))));
+  EXPECT_EQ(simulated.exit_code, 0) << simulated.text;
+  EXPECT_THAT(simulated.text, HasSubstr(warning));
+}
+
 TEST_F(Steering, NamesTheBoneThatASizeDoesNotFit) {
   std::ofstream(out("wrong.toml")) << "rig = \"" << SINEW_SOURCE_DIR "/assets/samples/hopper.glb"
                                    << "\"\n[[size]]\nbones = [\"tial*\"]\nfactor = 0.5\n";
