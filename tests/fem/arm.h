@@ -60,9 +60,10 @@ struct Arm {
   lattice::Surface skin;
 };
 
-/// `margin`: layers of cells round the flesh that hold none of it; `per_bone`: cells along each bone.
-inline Arm make_arm(lattice::CellType type = lattice::CellType::Hexahedron, int margin = 0,
-                    int per_bone = 5) {
+/// `margin`: layers round the flesh, as thick as half of it, that hold none of it; `per_bone`: cells along
+/// each bone; `through`: across the flesh, an even number as the bones are in the middle.
+inline Arm make_arm(lattice::CellType type = lattice::CellType::Hexahedron, int margin = 0, int per_bone = 5,
+                    int through = 2) {
   Arm arm;
   std::vector<skeleton::Joint> joints(3);
   const std::array<const char*, 3> names{"shoulder", "elbow", "wrist"};
@@ -79,13 +80,13 @@ inline Arm make_arm(lattice::CellType type = lattice::CellType::Hexahedron, int 
   // As many cells along the bones as wanted and one more at each end; y and z are cut at the bones.
   const double edge = 0.5 / per_bone;
   const double half = 0.12 * (1 + margin);
-  const int across = 2 * (1 + margin);
+  const int across = through * (1 + margin);
   const lattice::BoxOptions box{
       {-edge, -half, -half}, {1.0 + edge, half, half}, {2 * per_bone + 2, across, across}, type, {}};
   arm.lattice.complex = lattice::box_lattice(box);
-  arm.lattice.edge_length = std::max(0.12, edge);
+  arm.lattice.edge_length = std::max(0.24 / through, edge);
   arm.lattice.frame_of_joint = {0, 1, 1};
-  const auto vertex = [&](int i) { return i + (2 * per_bone + 3) * (1 + margin) * (across + 2); };
+  const auto vertex = [&](int i) { return i + (2 * per_bone + 3) * (across / 2) * (across + 2); };
   for (int b = 0; b < 2; ++b) {
     lattice::LatticeBone bone;
     bone.name = b == 0 ? "upper" : "lower";
