@@ -40,7 +40,10 @@ RepeatedFactor::RepeatedFactor(RepeatedFactor&&) noexcept = default;
 RepeatedFactor& RepeatedFactor::operator=(RepeatedFactor&&) noexcept = default;
 
 bool RepeatedFactor::ok() const { return impl_->ok; }
-std::size_t RepeatedFactor::num_nonzeros() const { return impl_->ok ? impl_->factor->xsize : 0; }
+std::size_t RepeatedFactor::num_nonzeros() const {
+  if (!impl_->ok) return 0;
+  return impl_->use == FactorUse::Preconditioner ? impl_->packed.num_values() : impl_->factor->xsize;
+}
 
 Factor::Report RepeatedFactor::factorise(const Eigen::SparseMatrix<double>& lower) {
   Impl& f = *impl_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -41,7 +42,7 @@ class RotatedModel final : public Model {
     Points x = balance.guess;
     const Rotations rotations = rotations_(x, *balance.pose);
     const Points residual = residual_of(balance, rotations, x);
-    SolveReport report = correct(balance, rotations, residual, options_.tolerance, x);
+    SolveReport report = correct(balance, rotations, residual, stage_tolerance(problem.h), x);
     if (report.ok()) velocity = (x - *problem.x_h) / (stage_of(problem.integrator).eta * problem.h);
     return report;
   }
@@ -62,6 +63,11 @@ class RotatedModel final : public Model {
   }
 
  private:
+  double stage_tolerance(double h) const {
+    const double angle = 2.0 * std::numbers::pi * body_.damping.frequency * h,
+                 least = options_.least_tolerance;
+    return std::clamp(options_.time_share * angle * angle, least, 100.0 * least);
+  }
   Points residual_of(const Balance& balance, const Rotations& rotations, const Points& x);
   Points apply(const Balance& balance, const Rotations& rotations, const Points& dx);
   SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
