@@ -28,6 +28,8 @@ using fem::Integrator;
 using lattice::Points;
 
 constexpr int kFrames = 60;  ///< of 1/60 s: one whole swing.
+constexpr int kRuns =
+    3;  ///< of which the fastest counts: neighbours in the caches cost up to half as much again.
 
 /// [ms]
 double processor_time() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -45,7 +47,7 @@ struct Swing {
   std::vector<Eigen::RowVector3d> tip;
 };
 
-Swing swing(const fem::Body& bar, Integrator integrator, int steps_per_frame) {
+Swing swing_once(const fem::Body& bar, Integrator integrator, int steps_per_frame) {
   fem::SimulationOptions options;
   options.model = "corotational";
   options.gravity.setZero();
@@ -64,6 +66,15 @@ Swing swing(const fem::Body& bar, Integrator integrator, int steps_per_frame) {
     result.tip.emplace_back(simulation.state().x.row(tip));
   }
   return result;
+}
+
+Swing swing(const fem::Body& bar, Integrator integrator, int steps_per_frame) {
+  Swing best = swing_once(bar, integrator, steps_per_frame);
+  for (int run = 1; run < kRuns; ++run) {
+    const Swing again = swing_once(bar, integrator, steps_per_frame);
+    if (again.mean_ms < best.mean_ms) best = again;
+  }
+  return best;
 }
 
 void print_frames() {
@@ -88,7 +99,7 @@ void print_frames() {
     head += fmt::format(" {} vertices, ms per frame | slowest | tip |", bar.mesh.num_vertices());
     rule += "---|---|---|";
     fmt::print(stderr, "{} vertices: converging in time\n", bar.mesh.num_vertices());
-    const Swing exact = swing(bar, Integrator::TrBdf2, 8);
+    const Swing exact = swing_once(bar, Integrator::TrBdf2, 8);
     for (std::size_t k = 0; k < choices.size(); ++k) {
       fmt::print(stderr, "{} vertices: {} {}\n", bar.mesh.num_vertices(), choices[k].name, choices[k].steps);
       const Swing s = swing(bar, choices[k].integrator, choices[k].steps);
@@ -101,19 +112,17 @@ void print_frames() {
 }
 
 struct Steps {
-  double median_ms = 0.0;
+  double median_ms = 0.0;    ///< of the fastest run.
   std::vector<Points> skin;  ///< after every step.
   Points x;
   fem::SolverCounts counts;
 };
 
 /// `count` steps of 1/120 s by BDF2; the first three, which factor and start, are not timed.
-Steps take_steps(const fem::Body& body, const fem::Motion& motion, const std::string& model,
-                 fem::Precision precision, int threads, int count) {
+Steps take_steps_once(const fem::Body& body, const fem::Motion& motion, const std::string& model,
+                      fem::Precision precision, int threads, int count) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(threads));
-  fmt::print(stderr, "{} vertices: {}, {}, {} threads\n", body.mesh.num_vertices(), model,
-             precision == fem::Precision::Float ? "float" : "double", threads);
   fem::SimulationOptions options;
   options.model = model;
   options.solver.precision = precision;
@@ -131,6 +140,17 @@ Steps take_steps(const fem::Body& body, const fem::Motion& motion, const std::st
   result.x = simulation.state().x;
   result.counts = simulation.counts();
   return result;
+}
+
+Steps take_steps(const fem::Body& body, const fem::Motion& motion, const std::string& model,
+                 fem::Precision precision, int threads, int count) {
+  fmt::print(stderr, "{} vertices: {}, {}, {} threads\n", body.mesh.num_vertices(), model,
+             precision == fem::Precision::Float ? "float" : "double", threads);
+  Steps best = take_steps_once(body, motion, model, precision, threads, count);
+  for (int run = 1; run < kRuns; ++run)
+    best.median_ms =
+        std::min(best.median_ms, take_steps_once(body, motion, model, precision, threads, count).median_ms);
+  return best;
 }
 
 /// What a column of the second table says, from the top.
