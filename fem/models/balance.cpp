@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -115,20 +116,28 @@ Balance rest_balance(const Body& body, const PoseProblem& problem, const Points&
 
 OuterForces outer_forces(const Body& body, const Balance& b, const Points& x) {
   const LeafMatrices& m = body.matrices;
-  Points ties = b.tie_target, inertia = Points::Zero(x.rows(), 3);
+  Points sum = b.load + b.tie_target, ties = b.tie_target, inertia = Points::Zero(x.rows(), 3);
   const bool moving = b.inertia > 0.0;
   over_vertices(body, [&](int a) {
     const auto i = static_cast<std::size_t>(a);
-    Eigen::RowVector3d tied = Eigen::RowVector3d::Zero(), carried = Eigen::RowVector3d::Zero();
+    Eigen::RowVector3d both = Eigen::RowVector3d::Zero(), tied = both, carried = both;
     for (auto e = static_cast<std::size_t>(m.row_start[i]); e < static_cast<std::size_t>(m.row_start[i + 1]);
          ++e) {
-      tied += m.tie[e] * x.row(m.column[e]);
-      if (moving) carried += m.mass[e] * (b.target.row(m.column[e]) - x.row(m.column[e]));
+      const Eigen::RowVector3d tie = m.tie[e] * x.row(m.column[e]);
+      both -= tie;
+      tied += tie;
+      if (!moving) continue;
+      const Eigen::RowVector3d mass =
+          (b.inertia * m.mass[e]) * (b.target.row(m.column[e]) - x.row(m.column[e]));
+      both += mass;
+      carried += mass;
     }
+    sum.row(a) += both;
     ties.row(a) -= tied;
-    inertia.row(a) = b.inertia * carried;
+    inertia.row(a) = carried;
   });
-  return {b.load + ties + inertia, b.load.norm() + ties.norm() + inertia.norm()};
+  const double scale = b.load.norm() + ties.norm() + inertia.norm();
+  return {std::move(sum), scale};
 }
 
 CellSum::CellSum(const Body& body) {

@@ -42,7 +42,7 @@ class RotatedModel final : public Model {
     Points x = balance.guess;
     const Rotations rotations = rotations_(x, *balance.pose);
     const Points residual = residual_of(balance, rotations, x);
-    SolveReport report = correct(balance, rotations, residual, stage_tolerance(problem.h), x);
+    SolveReport report = correct(balance, rotations, residual, enough_for(problem.h, residual), x);
     if (report.ok()) velocity = (x - *problem.x_h) / (stage_of(problem.integrator).eta * problem.h);
     return report;
   }
@@ -63,15 +63,16 @@ class RotatedModel final : public Model {
   }
 
  private:
-  double stage_tolerance(double h) const {
-    const double angle = 2.0 * std::numbers::pi * body_.damping.frequency * h,
-                 least = options_.least_tolerance;
-    return std::clamp(options_.time_share * angle * angle, least, 100.0 * least);
+  /// Residual that may be left of a stage [N].
+  double enough_for(double h, const Points& residual) const {
+    const double angle = 2.0 * std::numbers::pi * body_.damping.frequency * h;
+    const double share = std::min(options_.loosest, options_.time_share * angle * angle);
+    return std::max(options_.tolerance * scale_, share * residual.norm());
   }
   Points residual_of(const Balance& balance, const Rotations& rotations, const Points& x);
   Points apply(const Balance& balance, const Rotations& rotations, const Points& dx);
   SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
-                      double tolerance, Points& x);
+                      double enough, Points& x);
   bool refactor(const Balance& balance, const Rotations& rotations, SolveReport& report);
   std::vector<Eigen::Matrix3d> turns_since_factor(const Rotations& rotations) const;
   void precondition(const std::vector<Eigen::Matrix3d>& turns, const Points& residual, Points& result) const;
@@ -183,16 +184,15 @@ void RotatedModel::precondition(const std::vector<Eigen::Matrix3d>& turns, const
     result.row(i) = (turns[static_cast<std::size_t>(i)] * result.row(i).transpose()).transpose();
 }
 
-/// Adds to x the solution of the system for `residual`.
+/// Adds to x the solution of the system for `residual`, but for `enough` of it [N].
 SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotations, const Points& residual,
-                                  double tolerance, Points& x) {
+                                  double enough, Points& x) {
   SolveReport report;
   const bool other = factor_inertia_ != balance.inertia || factor_damping_ != balance.damping;
   if ((other || !factor_.ok()) && !refactor(balance, rotations, report)) return report;
 
   Points r = residual, dx = Points::Zero(r.rows(), 3), z, direction, image;
   std::vector<Eigen::Matrix3d> turns = turns_since_factor(rotations);
-  const double enough = tolerance * scale_;
   double rz = 0.0;
   bool fresh = false;
   for (int since_factor = 0; r.norm() > enough; ++report.iterations, ++since_factor) {
@@ -239,7 +239,8 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
       return total;
     }
     const Points before = solution;
-    const SolveReport step = correct(balance, rotations, residual, 0.1 * options_.rest_tolerance, solution);
+    const SolveReport step =
+        correct(balance, rotations, residual, 0.1 * options_.rest_tolerance * scale_, solution);
     if (!step.ok()) return step;
     if ((solution - before).cwiseAbs().maxCoeff() <= 1e-15 * extent) {
       x = solution;

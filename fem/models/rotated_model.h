@@ -9,11 +9,12 @@ namespace sinew::fem {
 
 /// How the one linear system of a stage is solved.
 struct RotatedOptions {
-  /// Residual that the conjugate gradients of a stage leave over the forces that balance [-]: this share of
-  /// (w0 h)^2, w0 = 2 pi times the damping frequency, which is what the step itself errs by; at least
-  /// `least_tolerance` and at most a hundred times that.
+  /// Share of a stage's first residual that the conjugate gradients leave [-]: this times (w0 h)^2, w0 = 2 pi
+  /// times the damping frequency, which is what the step itself errs by, and at most `loosest`; never less
+  /// than `tolerance` of the forces that balance.
   double time_share = 1e-3;
-  double least_tolerance = 1e-6;  ///< in (0, 1).
+  double loosest = 1e-4;          ///< in (0, 1).
+  double tolerance = 1e-6;        ///< in (0, 1).
   double rest_tolerance = 1e-10;  ///< the same at rest.
   /// Iterations after which the preconditioner is factored anew; >= 1.
   int stale_after = 15;

@@ -220,9 +220,9 @@ State tumbled(const Body& body, double h, double time) {
   return simulation.state();
 }
 
-// The conjugate gradients stop at a thousandth of (w0 h)^2 of the forces, w0 the frequency of the damping:
-// here 1e-4, and 1e-6 for a tenth of that frequency. It leaves less than a hundredth of what the step itself
-// errs by.
+// The conjugate gradients stop at a thousandth of (w0 h)^2 of the forces they start from, w0 the frequency of
+// the damping: here 1e-4, and for a tenth of that frequency at 1e-6 of all forces. It leaves less than a
+// hundredth of what the step itself errs by.
 TEST(Corotational, StepsAsADirectSolveOfItsSystemDoes) {
   tests::BarOptions bar;
   bar.material = {2e4, 0.45, 1000.0};
