@@ -12,6 +12,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "fem/detail/anderson_mixing.h"
 #include "fem/detail/turned_cells.h"
 #include "fem/models/balance.h"
 #include "fem/models/free_system.h"
@@ -229,6 +230,8 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
   SolveReport total;
   Points residual;
   const double extent = solution.rowwise().norm().maxCoeff();
+  detail::AndersonMixing mixing(5);
+  constexpr int kMixed = 200;
   for (; total.iterations < options_.max_rest_iterations; ++total.iterations) {
     const Rotations rotations = rotations_(solution, *balance.pose);
     residual = residual_of(balance, rotations, solution);
@@ -242,14 +245,19 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
     const SolveReport step =
         correct(balance, rotations, residual, 0.1 * options_.rest_tolerance * scale_, solution);
     if (!step.ok()) return step;
+    // Mixing halves the iterations where rotations are smooth. Those of cells turned inside out jump, and
+    // there patience is better.
+    if (total.iterations < kMixed)
+      solution = before + free_.spread(mixing.step(free_.gather(solution - before)));
     if ((solution - before).cwiseAbs().maxCoeff() <= 1e-15 * extent) {
       x = solution;
       return total;
     }
   }
   total.status = SolveStatus::NoConvergence;
-  total.message = fmt::format("{}: no balance of forces after {} iterations, residual {:.2g} of the forces",
-                              name_, total.iterations, total.residual);
+  total.message = fmt::format(
+      "{}: no balance of forces after {} iterations, residual {:.2g} of the forces; hint: neo-hookean", name_,
+      total.iterations, total.residual);
   name_worst_cell(body_, solution, free_.spread(residual), total);
   return total;
 }
