@@ -183,7 +183,12 @@ void find_pose(const PoseRequest& request) {
   assets::OutputDirectory out(
       scene.output, scene.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse, kPoseOutputs);
   const Character character = make_character(scene, talk);
-  const double time = pose_time(request, scene, character.the_clip());
+  const skeleton::Clip& clip = character.the_clip();
+  const double time = pose_time(request, scene, clip);
+  if (clip.num_keys > 0 && std::abs(time - std::clamp(time, clip.start, clip.end)) > 1e-9)
+    talk(fmt::format(
+        "warning: --time: {:g} s is outside of the clip, {:g} to {:g} s; the pose at its {} is taken", time,
+        clip.start, clip.end, time < clip.start ? "start" : "end"));
   const fem::Body body = make_body(character);
   stop_if_interrupted("before the equilibrium");
   fem::EquilibriumOptions options;

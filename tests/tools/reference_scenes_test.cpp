@@ -158,6 +158,10 @@ TEST_F(ReferencePoses, RefuseWrongTimesAndSteps) {
   EXPECT_EQ(pose("bar_sag", "--time soon").text,
             "sinew: --time: got 'soon', expected a number of seconds within 1e6; hint: 0.5\n");
   EXPECT_EQ(pose("bar_sag", "--load-steps 0").exit_code, 2);
+  const tests::Outcome late = pose("elbow", "--model skin --time 99");
+  EXPECT_EQ(late.exit_code, 0);
+  EXPECT_NE(late.text.find("warning: --time: 99 s is outside of the clip, 0 to "), std::string::npos)
+      << late.text;
 }
 
 }  // namespace
