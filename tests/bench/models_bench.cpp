@@ -57,8 +57,9 @@ std::map<std::string, std::string> columns(const fem::Body& body, int frames) {
   std::map<std::string, std::string> cells;
   for (const auto& [model, r] : runs) {
     const double share = 100.0 * tests::rms_distance(r.tip, exact.tip);
-    cells[model] = fmt::format("{:.2g} | {:.2g} | {}", r.median_ms, r.median_ms / base.median_ms,
-                               r.failure.empty() ? fmt::format("{:.2g} %", share) : r.failure);
+    cells[model] = fmt::format("{} | {} | {}", tests::short_number(r.median_ms),
+                               tests::short_number(r.median_ms / base.median_ms),
+                               r.failure.empty() ? tests::short_number(share) + " %" : r.failure);
   }
   return cells;
 }

@@ -103,7 +103,7 @@ void print_frames() {
     for (std::size_t k = 0; k < choices.size(); ++k) {
       fmt::print(stderr, "{} vertices: {} {}\n", bar.mesh.num_vertices(), choices[k].name, choices[k].steps);
       const Swing s = swing(bar, choices[k].integrator, choices[k].steps);
-      rows[k] += fmt::format(" {:.2g} | {:.0f} | {:.2g} % |", s.mean_ms, s.worst_ms,
+      rows[k] += fmt::format(" {} | {:.0f} | {:.2g} % |", tests::short_number(s.mean_ms), s.worst_ms,
                              100.0 * tests::rms_distance(s.tip, exact.tip));
     }
   }
@@ -160,7 +160,7 @@ std::vector<std::string> step_column(const fem::Body& body, const fem::Motion& m
     const Steps one = take_steps(body, motion, model, precision, 1, count),
                 two = take_steps(body, motion, model, precision, 2, count);
     if (one.x != two.x) throw std::runtime_error(model + ": the bits depend on the number of threads");
-    both = fmt::format("{:.2g} / {:.2g}", one.median_ms, two.median_ms);
+    both = tests::short_number(one.median_ms) + " / " + tests::short_number(two.median_ms);
     return one;
   };
   std::string in_double, in_float, corotational;

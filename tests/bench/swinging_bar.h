@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "tests/fem/bar.h"
 
@@ -38,6 +41,11 @@ inline double rms_distance(const std::vector<Eigen::RowVector3d>& a,
   const std::size_t n = std::min(a.size(), b.size());
   for (std::size_t k = 0; k < n; ++k) sum += (a[k] - b[k]).squaredNorm();
   return std::sqrt(sum / static_cast<double>(n));
+}
+
+/// Two significant digits, or whole numbers from 100 on.
+inline std::string short_number(double value) {
+  return value < 99.5 ? fmt::format("{:.2g}", value) : fmt::format("{:.0f}", value);
 }
 
 }  // namespace sinew::tests
