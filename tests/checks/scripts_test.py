@@ -167,9 +167,9 @@ class Scripts(unittest.TestCase):
         self.assertEqual(self.readme(), text)
 
     def test_tables_refuse_a_table_that_is_not(self):
-        result = self.run_script("tools/tables", "--only", "speed")
+        result = self.run_script("tools/tables", "--only", "weather")
         self.assertEqual(result.returncode, 2)
-        self.assertIn("--only: got speed, expected models, oracle,", result.stderr)
+        self.assertIn("--only: got weather, expected models, speed,", result.stderr)
         self.readme("no marks\n")
         self.bench("oracle_bench", "echo '| new |'")
         result = self.run_script("tools/tables", "--only", "oracle")
