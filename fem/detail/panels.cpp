@@ -1,7 +1,11 @@
 #include "fem/detail/panels.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
+
+#include <tbb/parallel_for.h>
 
 namespace sinew::fem::detail {
 namespace {
@@ -122,46 +126,85 @@ SINEW_INLINE void backward_block_of(int width, const Scalar* values, Scalar* t, 
 
 }  // namespace
 
-/// Both sweeps, compiled once for the processor at hand and once for any.
+/// Sweeps over one panel, compiled once for the processor at hand and once for any.
 template <class Scalar>
 struct Panels<Scalar>::Sweeps {
-  SINEW_INLINE static void run(const Panels& panels, Scalar* x, Scalar* t) {
+  /// Adds to `above` instead of x what belongs to columns from `column_end` on.
+  SINEW_INLINE static void forward(const Panels& panels, std::size_t panel, Scalar* x, Scalar* t,
+                                   int column_end, Scalar* above) {
     constexpr int kLanes = LanesOf<Scalar>::kCount;
-    for (const Panel& p : panels.panels_) {
-      const int* rows = panels.row_index_.data() + p.indices;
-      std::copy(x + p.first, x + p.first + p.columns, t);
-      std::fill(t + p.columns, t + p.rows + kLanes, Scalar(0));
-      const Scalar* values = panels.values_.data() + p.values;
-      for (int j = 0; j < p.columns; j += kBlock) {
-        const int width = std::min(kBlock, p.columns - j);
-        forward_block_of(width, values, t + j, p.rows - j);
-        values += block_size<Scalar>(width, p.rows - j);
-      }
-      std::copy(t, t + p.columns, x + p.first);
-      for (int i = p.columns; i < p.rows; ++i) x[rows[i - p.columns]] += t[i];
+    const Panel& p = panels.panels_[panel];
+    const int* rows = panels.row_index_.data() + p.indices;
+    std::copy(x + p.first, x + p.first + p.columns, t);
+    std::fill(t + p.columns, t + p.rows + kLanes, Scalar(0));
+    const Scalar* values = panels.values_.data() + p.values;
+    for (int j = 0; j < p.columns; j += kBlock) {
+      const int width = std::min(kBlock, p.columns - j);
+      forward_block_of(width, values, t + j, p.rows - j);
+      values += block_size<Scalar>(width, p.rows - j);
     }
-    for (auto p = panels.panels_.rbegin(); p != panels.panels_.rend(); ++p) {
-      if (!p->needed) continue;
-      const int* rows = panels.row_index_.data() + p->indices;
-      std::copy(x + p->first, x + p->first + p->columns, t);
-      for (int i = p->columns; i < p->rows; ++i) t[i] = x[rows[i - p->columns]];
-      std::fill(t + p->rows, t + p->rows + kLanes, Scalar(0));
-      const Scalar* end = p == panels.panels_.rbegin() ? panels.values_.data() + panels.values_.size()
-                                                       : panels.values_.data() + (p - 1)->values;
-      for (int j = (p->columns - 1) / kBlock * kBlock; j >= 0; j -= kBlock) {
-        const int width = std::min(kBlock, p->columns - j);
-        end -= block_size<Scalar>(width, p->rows - j);
-        backward_block_of(width, end, t + j, p->rows - j);
-      }
-      std::copy(t, t + p->columns, x + p->first);
+    std::copy(t, t + p.columns, x + p.first);
+    int i = p.columns;
+    for (; i < p.rows && rows[i - p.columns] < column_end; ++i) x[rows[i - p.columns]] += t[i];
+    for (; i < p.rows; ++i) above[panels.top_index_[static_cast<std::size_t>(rows[i - p.columns])]] += t[i];
+  }
+  SINEW_INLINE static void backward(const Panels& panels, std::size_t panel, Scalar* x, Scalar* t) {
+    constexpr int kLanes = LanesOf<Scalar>::kCount;
+    const Panel& p = panels.panels_[panel];
+    if (!p.needed) return;
+    const int* rows = panels.row_index_.data() + p.indices;
+    std::copy(x + p.first, x + p.first + p.columns, t);
+    for (int i = p.columns; i < p.rows; ++i) t[i] = x[rows[i - p.columns]];
+    std::fill(t + p.rows, t + p.rows + kLanes, Scalar(0));
+    const Scalar* end = panels.values_.data() + panels.values_end(panel);
+    for (int j = (p.columns - 1) / kBlock * kBlock; j >= 0; j -= kBlock) {
+      const int width = std::min(kBlock, p.columns - j);
+      end -= block_size<Scalar>(width, p.rows - j);
+      backward_block_of(width, end, t + j, p.rows - j);
+    }
+    std::copy(t, t + p.columns, x + p.first);
+  }
+
+  SINEW_INLINE static void forward_part(const Panels& panels, const std::vector<Subtree>& part, Scalar* x,
+                                        Scalar* t, Scalar* above) {
+    std::fill(above, above + panels.num_top_columns_, Scalar(0));
+    for (const Subtree& s : part) {
+      for (std::size_t k = s.begin; k < s.end; ++k) forward(panels, k, x, t, s.column_end, above);
     }
   }
-  SINEW_WIDE_LANES static void run_wide(const Panels& panels, Scalar* x, Scalar* t) { run(panels, x, t); }
-  static void run_any(const Panels& panels, Scalar* x, Scalar* t) { run(panels, x, t); }
+  SINEW_INLINE static void backward_part(const Panels& panels, const std::vector<Subtree>& part, Scalar* x,
+                                         Scalar* t) {
+    for (auto s = part.rbegin(); s != part.rend(); ++s) {
+      for (std::size_t k = s->end; k-- > s->begin;) backward(panels, k, x, t);
+    }
+  }
+  SINEW_INLINE static void top(const Panels& panels, Scalar* x, Scalar* t) {
+    const int all = std::numeric_limits<int>::max();
+    for (const std::size_t k : panels.top_) forward(panels, k, x, t, all, nullptr);
+    for (auto k = panels.top_.rbegin(); k != panels.top_.rend(); ++k) backward(panels, *k, x, t);
+  }
+
+  SINEW_WIDE_LANES static void forward_wide(const Panels& panels, const std::vector<Subtree>& part, Scalar* x,
+                                            Scalar* t, Scalar* above) {
+    forward_part(panels, part, x, t, above);
+  }
+  SINEW_WIDE_LANES static void backward_wide(const Panels& panels, const std::vector<Subtree>& part,
+                                             Scalar* x, Scalar* t) {
+    backward_part(panels, part, x, t);
+  }
+  SINEW_WIDE_LANES static void top_wide(const Panels& panels, Scalar* x, Scalar* t) { top(panels, x, t); }
+  static void forward_any(const Panels& panels, const std::vector<Subtree>& part, Scalar* x, Scalar* t,
+                          Scalar* above) {
+    forward_part(panels, part, x, t, above);
+  }
+  static void backward_any(const Panels& panels, const std::vector<Subtree>& part, Scalar* x, Scalar* t) {
+    backward_part(panels, part, x, t);
+  }
+  static void top_any(const Panels& panels, Scalar* x, Scalar* t) { top(panels, x, t); }
 };
 
 template <class Scalar>
-Panels<Scalar>::Panels(int size, const std::vector<Supernode>& supernodes) {
+Panels<Scalar>::Panels(int size, const std::vector<Supernode>& supernodes, std::size_t divide_from) {
   // Parents come later: a needed panel passes the need on to the panel that holds its first row below.
   std::vector<std::uint8_t> needed(static_cast<std::size_t>(size), 0);
   std::size_t num_values = 0;
@@ -178,6 +221,62 @@ Panels<Scalar>::Panels(int size, const std::vector<Supernode>& supernodes) {
   }
   values_.resize(num_values);
   for (std::size_t k = 0; k < supernodes.size(); ++k) pack(supernodes[k], values_.data() + panels_[k].values);
+  top_index_.assign(static_cast<std::size_t>(size), -1);
+  divide(divide_from);
+}
+
+/// Takes the largest subtrees apart until none is more than an eighth of the whole, then deals them out to
+/// parts of about that size. What is left above them is the top.
+template <class Scalar>
+void Panels<Scalar>::divide(std::size_t divide_from) {
+  const std::size_t n = panels_.size();
+  std::vector<std::size_t> first(n), size(n);  // of the subtree under a panel: its first panel, its values
+  std::vector<std::vector<std::size_t>> children(n + 1);  // the last: roots
+  std::vector<std::size_t> panel_of_column(top_index_.size());
+  for (std::size_t k = 0; k < n; ++k) {
+    for (int j = 0; j < panels_[k].columns; ++j)
+      panel_of_column[static_cast<std::size_t>(panels_[k].first + j)] = k;
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    first[k] = children[k].empty() ? k : first[children[k].front()];
+    size[k] = values_end(k) - panels_[k].values;
+    for (const std::size_t child : children[k]) size[k] += size[child];
+    const bool is_root = panels_[k].rows == panels_[k].columns;
+    children[is_root ? n : panel_of_column[static_cast<std::size_t>(row_index_[panels_[k].indices])]]
+        .push_back(k);
+  }
+  const std::size_t most = values_.size() / 8;
+  std::vector<std::size_t> roots;
+  std::vector<std::size_t> open = children[n];
+  if (values_.size() <= divide_from) {
+    open.clear();
+    for (std::size_t k = 0; k < n; ++k) top_.push_back(k);
+  }
+  while (!open.empty()) {
+    const std::size_t k = open.back();
+    open.pop_back();
+    if (size[k] <= most || children[k].empty()) {
+      roots.push_back(k);
+    } else {
+      top_.push_back(k);
+      open.insert(open.end(), children[k].begin(), children[k].end());
+    }
+  }
+  std::sort(top_.begin(), top_.end());
+  std::sort(roots.begin(), roots.end());
+  std::size_t dealt = most;
+  for (const std::size_t k : roots) {
+    if (dealt >= most) {
+      parts_.emplace_back();
+      dealt = 0;
+    }
+    parts_.back().push_back({first[k], k + 1, panels_[k].first + panels_[k].columns});
+    dealt += size[k];
+  }
+  for (const std::size_t k : top_) {
+    for (int j = 0; j < panels_[k].columns; ++j)
+      top_index_[static_cast<std::size_t>(panels_[k].first + j)] = num_top_columns_++;
+  }
 }
 
 template <class Scalar>
@@ -204,7 +303,28 @@ void Panels<Scalar>::pack(const Supernode& s, Scalar* to) const {
 
 template <class Scalar>
 void Panels<Scalar>::solve(Scalar* x, Scalar* work, Code code) const {
-  code == Code::Wide ? Sweeps::run_wide(*this, x, work) : Sweeps::run_any(*this, x, work);
+  const bool wide = code == Code::Wide;
+  const auto part_work = [&](std::size_t i) {
+    return work + work_size_ + static_cast<std::ptrdiff_t>(i) * part_work_size();
+  };
+  tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
+    Scalar *t = part_work(i), *above = t + work_size_;
+    wide ? Sweeps::forward_wide(*this, parts_[i], x, t, above)
+         : Sweeps::forward_any(*this, parts_[i], x, t, above);
+  });
+  // In the order of the parts: the same bits for any number of threads.
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const Scalar* above = part_work(i) + work_size_;
+    for (const std::size_t k : top_) {
+      Scalar* column = x + panels_[k].first;
+      for (int j = 0; j < panels_[k].columns; ++j) column[j] += *above++;
+    }
+  }
+  wide ? Sweeps::top_wide(*this, x, work) : Sweeps::top_any(*this, x, work);
+  tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
+    wide ? Sweeps::backward_wide(*this, parts_[i], x, part_work(i))
+         : Sweeps::backward_any(*this, parts_[i], x, part_work(i));
+  });
 }
 
 template <class Scalar>
@@ -212,7 +332,7 @@ std::size_t Panels<Scalar>::num_values_read() const {
   std::size_t read = values_.size();
   for (std::size_t k = 0; k < panels_.size(); ++k) {
     if (!panels_[k].needed) continue;
-    read += (k + 1 < panels_.size() ? panels_[k + 1].values : values_.size()) - panels_[k].values;
+    read += values_end(k) - panels_[k].values;
   }
   return read;
 }

@@ -21,14 +21,17 @@ template <class Scalar>
 class Panels {
  public:
   Panels() = default;
-  /// Copies a factor of `size` rows; supernodes in ascending order.
-  Panels(int size, const std::vector<Supernode>& supernodes);
+  /// Copies a factor of `size` rows; supernodes in ascending postorder. Factors of more than `divide_from`
+  /// values are divided into subtrees that threads solve side by side.
+  Panels(int size, const std::vector<Supernode>& supernodes, std::size_t divide_from = kDivideFrom);
 
   /// Solves L y = b, then L^T x = y, in place. Where a panel neither is wanted nor has a wanted descendant,
   /// x is left at y: the backward sweep runs from the root down, and nothing wanted depends on it.
-  /// `work`: work_size() numbers.
+  /// `work`: work_size() numbers. The bits do not depend on the number of threads.
   void solve(Scalar* x, Scalar* work, Code code = best_code()) const;
-  int work_size() const { return work_size_; }
+  int work_size() const { return work_size_ + num_parts() * part_work_size(); }
+  /// Parts of the factor that are solved side by side; 0: the whole of it in one go.
+  int num_parts() const { return static_cast<int>(parts_.size()); }
 
   std::size_t num_values() const { return values_.size(); }
   /// Values that a solve reads: all once forward, those of needed panels once backward.
@@ -41,13 +44,30 @@ class Panels {
     std::size_t values = 0;   ///< offset of its first block.
     std::size_t indices = 0;  ///< offset of the indices of its rows below the triangle.
   };
+  /// A subtree: panels begin .. end - 1, with the columns below `column_end`.
+  struct Subtree {
+    std::size_t begin = 0, end = 0;
+    int column_end = 0;
+  };
   void pack(const Supernode& supernode, Scalar* to) const;
+  std::size_t values_end(std::size_t panel) const {
+    return panel + 1 < panels_.size() ? panels_[panel + 1].values : values_.size();
+  }
+  void divide(std::size_t divide_from);
+  int part_work_size() const { return work_size_ + num_top_columns_; }
   struct Sweeps;
+
+  /// Half a megabyte of floats takes as long as starting a few tasks twice does.
+  static constexpr std::size_t kDivideFrom = std::size_t{1} << 18;
 
   std::vector<Panel> panels_;
   std::vector<int> row_index_;
   std::vector<Scalar> values_;
   int work_size_ = 0;
+  std::vector<std::vector<Subtree>> parts_;
+  std::vector<std::size_t> top_;  ///< panels above all subtrees, ascending.
+  std::vector<int> top_index_;    ///< of a column: its place among the columns of `top_`, or -1.
+  int num_top_columns_ = 0;
 };
 
 extern template class Panels<float>;

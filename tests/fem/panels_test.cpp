@@ -69,6 +69,23 @@ TEST(Panels, SolveLikeDenseTriangles) {
     EXPECT_NEAR(x[static_cast<std::size_t>(i)], expected[i], 1e-12);
 }
 
+// Divided, the leaves are solved side by side; the root, which all of them hang on, after and before them.
+TEST(Panels, SolveLikeDenseTrianglesWhereTheyAreDivided) {
+  std::mt19937_64 rng(14);
+  const ThreeLeaves leaves(rng);
+  const Panels<double> panels(ThreeLeaves::kSize, leaves.supernodes, 0);
+  EXPECT_GE(panels.num_parts(), 2);
+  for (int n = 0; n < 20; ++n) {
+    const Eigen::VectorXd b = Eigen::VectorXd::NullaryExpr(
+        ThreeLeaves::kSize, [&](Eigen::Index) { return tests::uniform(rng, -1.0, 1.0); });
+    const Eigen::VectorXd expected = (leaves.l * leaves.l.transpose()).lu().solve(b);
+    const std::vector<double> x = solved(panels, b, best_code());
+    for (int i = 0; i < ThreeLeaves::kSize; ++i)
+      EXPECT_NEAR(x[static_cast<std::size_t>(i)], expected[i], 1e-12);
+    EXPECT_EQ(solved(panels, b, Code::Portable), x);
+  }
+}
+
 template <class Scalar>
 void expect_same_bits_from_both_codes() {
   std::mt19937_64 rng(12);
