@@ -31,13 +31,7 @@ double median(std::vector<double> values) {
   return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
 }
 
-struct Size {
-  int cells;
-  double seconds;  ///< of one core that the median build may take.
-};
-std::ostream& operator<<(std::ostream& out, const Size& size) { return out << size.cells << " cells"; }
-
-class LatticesOfRigs : public testing::TestWithParam<Size> {};
+class LatticesOfRigs : public testing::TestWithParam<int> {};  // wanted number of cells
 
 TEST_P(LatticesOfRigs, PassTheWholeGate) {
   const std::vector<std::string> files = skinned_files();
@@ -50,7 +44,7 @@ TEST_P(LatticesOfRigs, PassTheWholeGate) {
     const LatticeInput input = lattice_input(load_rig(file, load));
     const std::clock_t start = std::clock();
     const lattice::BuildResult result =
-        lattice::build(input.skin.surface, input.joints, {.cells = GetParam().cells});
+        lattice::build(input.skin.surface, input.joints, {.cells = GetParam()});
     seconds.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
     const lattice::LatticeQuality& q = result.lattice.quality;
     for (const lattice::GateFailure& failure : result.failures) ADD_FAILURE() << failure.what;
@@ -64,8 +58,7 @@ TEST_P(LatticesOfRigs, PassTheWholeGate) {
     for (const lattice::Cell& cell : result.lattice.complex.cells)
       EXPECT_GE(lattice::min_corner_jacobian(result.lattice.complex, cell), 0.10);
     // "Lands within about 10 %": measured -9 ... +5 % on these files.
-    EXPECT_NEAR(static_cast<double>(result.lattice.complex.cells.size()), GetParam().cells,
-                0.12 * GetParam().cells);
+    EXPECT_NEAR(static_cast<double>(result.lattice.complex.cells.size()), GetParam(), 0.12 * GetParam());
     dihedral.push_back(q.min_dihedral_degrees);
     jacobian.push_back(q.min_scaled_jacobian);
   }
@@ -76,8 +69,7 @@ TEST_P(LatticesOfRigs, PassTheWholeGate) {
                            median(jacobian), median(seconds));
 }
 
-INSTANTIATE_TEST_SUITE_P(Cells, LatticesOfRigs,
-                         testing::Values(Size{200, 1.5}, Size{1000, 1.5}, Size{5000, 5.0}));
+INSTANTIATE_TEST_SUITE_P(Cells, LatticesOfRigs, testing::Values(200, 1000, 5000));
 
 }  // namespace
 }  // namespace sinew::assets

@@ -123,6 +123,27 @@ TEST(MirroredMotion, MovesTheFleshOfAHopperLikeAMirrorImage) {
   for (const int cells : {200, 600}) expect_mirrored_motion(rig, cells);
 }
 
+// A skin from a file is mirrored to single precision. Partners are measured by the skin of both, and so have
+// the same radius to the bit.
+TEST(MirroredMotion, MeasuresPartnersByTheSkinOfBoth) {
+  Rig legs = two_legs();
+  const lattice::ControlLattice lattice = lattice::build(legs.skin, legs.joints, {.cells = 150}).lattice;
+  for (Eigen::Index v = 0; v < legs.skin.points.rows(); ++v)
+    if (legs.skin.points(v, 0) < 0.0) legs.skin.points(v, 0) *= 1.0 + 1e-6;
+  const std::optional<lattice::MirrorMap> map = lattice::find_mirror_map(lattice, legs.skin);
+  ASSERT_TRUE(map);
+  const FrameTree tree = frame_tree(lattice, skeleton_of(legs.joints));
+  const LimbRadii own(lattice, tree, legs.skin, lattice.edge_length),
+      shared(lattice, tree, legs.skin, lattice.edge_length, &*map);
+  int differences = 0;
+  for (int b = 0; b < static_cast<int>(lattice.bones.size()); ++b) {
+    const int partner = map->bones[static_cast<std::size_t>(b)];
+    EXPECT_EQ(shared.of_bone(b), shared.of_bone(partner)) << lattice.bones[static_cast<std::size_t>(b)].name;
+    differences += own.of_bone(b) != own.of_bone(partner);
+  }
+  EXPECT_GT(differences, 0) << "there is nothing to share";
+}
+
 TEST(MirroredMotion, NeedsAMirroredLattice) {
   const Rig legs = two_legs();
   const lattice::BuildResult other =

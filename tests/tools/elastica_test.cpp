@@ -1,11 +1,11 @@
 // Slender bars under large rotations, scenes of tests/scenes, against the elastica.
 
 #include <cmath>
-#include <fstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/analytic.h"
 #include "tests/fem/bar.h"
 #include "tests/publish.h"
 #include "tests/tools/scene_body.h"
@@ -14,12 +14,6 @@ namespace sinew::tools {
 namespace {
 
 using lattice::Points;
-
-nlohmann::json analytic() {
-  std::ifstream stream(std::string(SINEW_SHARED_DIR) + "/reference/analytic.json");
-  EXPECT_TRUE(stream.good());
-  return nlohmann::json::parse(stream);
-}
 
 /// Tip of a slender bar at multiples of its scene's load against rows of the elastica.
 void expect_elastica(const std::string& scene, const std::string& table, const std::string& load_key,
@@ -34,7 +28,7 @@ void expect_elastica(const std::string& scene, const std::string& table, const s
   Points x = body.mesh.points;
   double reached = 0.0;
   tests::Range errors;
-  const nlohmann::json answers = analytic();
+  const nlohmann::json answers = tests::analytic();
   for (const auto& row : answers.at(table)) {
     const double load = row.at(load_key);
     for (double factor = std::min(load, reached + 4.0);; factor = std::min(load, factor + 4.0)) {

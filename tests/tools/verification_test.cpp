@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <map>
 
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 
 #include "fem/cell_report.h"
 #include "fem/simulation.h"
+#include "tests/analytic.h"
 #include "tests/fem/bar.h"
 #include "tests/publish.h"
 #include "tests/tools/scene_body.h"
@@ -19,13 +19,8 @@ namespace {
 
 using fem::Body;
 using lattice::Points;
+using tests::analytic;
 using tests::SceneBody;
-
-nlohmann::json analytic() {
-  std::ifstream stream(std::string(SINEW_SHARED_DIR) + "/reference/analytic.json");
-  EXPECT_TRUE(stream.good());
-  return nlohmann::json::parse(stream);
-}
 
 double percent(double value, double exact) { return 100.0 * (value / exact - 1.0); }
 
