@@ -96,5 +96,37 @@ TEST_F(MirrorMapOfHands, FindsNoneWhereAVertexABoneOrAWeightDiffers) {
   EXPECT_FALSE(find_mirror_map(bare, hands_.skin));
 }
 
+/// Two legs that overlap in the plane of symmetry, where their skin hangs on both thighs alike.
+tests::Character touching_legs() {
+  tests::Character c;
+  const int pelvis = c.add_joint("pelvis", -1, {0, 1.2, 0});
+  c.add_capsule(pelvis, {0, 1.0, 0}, {0, 1.4, 0}, 0.2);
+  std::vector<int> thighs;
+  for (const double side : {-1.0, 1.0}) {
+    const std::string name = side < 0 ? "left" : "right";
+    const int hip = c.add_joint(name + "_hip", pelvis, {0.1 * side, 1.0, 0});
+    const int knee = c.add_joint(name + "_knee", hip, {0.1 * side, 0.5, 0});
+    c.add_joint(name + "_foot", knee, {0.1 * side, 0.0, 0});
+    c.add_capsule(hip, {0.1 * side, 1.0, 0}, {0.1 * side, 0.5, 0}, 0.14);
+    c.add_capsule(knee, {0.1 * side, 0.5, 0}, {0.1 * side, 0.0, 0}, 0.14);
+    thighs.push_back(hip);
+  }
+  for (std::size_t v = 0; v < c.skin.weights.size(); ++v)
+    if (c.skin.weights[v][0].frame != pelvis && std::abs(c.skin.points(static_cast<int>(v), 0)) < 1e-9)
+      c.skin.weights[v] = {{thighs[0], 0.5}, {thighs[1], 0.5}};
+  return c;
+}
+
+// Of two thighs that weigh alike one comes first, and which triangles cross a cell depends on how they are
+// split: unless both sides count, some cells get copies on one side only.
+TEST(MirrorMap, PairsCellsWhereLimbsMeetInThePlane) {
+  const tests::Character legs = touching_legs();
+  for (const int cells : {320, 580}) {
+    const BuildResult built = build(legs.skin, legs.joints, {.cells = cells});
+    ASSERT_TRUE(built.mirror) << built.no_mirror;
+    EXPECT_TRUE(find_mirror_map(built.lattice, legs.skin)) << cells;
+  }
+}
+
 }  // namespace
 }  // namespace sinew::lattice
