@@ -27,7 +27,8 @@ void over_vertices(const Body& body, const Action& action) {
                     });
 }
 
-Points tie_targets(const Body& body, const PosedFrames& posed) {
+/// Force of the ties on flesh at x.
+Points tie_pull(const Body& body, const PosedFrames& posed, const Points& x) {
   Points target = Points::Zero(body.mesh.num_vertices(), 3);
   for (const Tie& tie : body.ties) {
     const Eigen::Affine3d& map = posed.frames[static_cast<std::size_t>(tie.frame)].from_rest;
@@ -35,7 +36,7 @@ Points tie_targets(const Body& body, const PosedFrames& posed) {
     for (std::size_t k = 0; k < tie.vertices.size(); ++k)
       target.row(tie.vertices[k]) += (map.linear() * tie.first[k] + tie.zeroth[k] * centre).transpose();
   }
-  return target;
+  return target - apply_tie(body.matrices, x);
 }
 
 Points weights(const Body& body, const Eigen::Vector3d& gravity, const Points* force) {
@@ -93,42 +94,45 @@ Balance stage_balance(const Body& body, const StageProblem& p) {
     carried_past += past.share * carried(body, *past.x, *past.pose, *p.poses.stage);
   const double of_velocity = 1.0 / (stage.theta * p.h);
   b.inertia = (of_velocity + alpha) / eta_h;
-  b.target = *p.x_h + (of_velocity * *p.v_h + (alpha / kappa_h) * (carried_past - *p.x_h)) / b.inertia;
-  b.tie_target = tie_targets(body, *p.poses.stage);
+  b.origin = *p.x_h;
+  b.target = (of_velocity * *p.v_h + (alpha / kappa_h) * (carried_past - b.origin)) / b.inertia;
+  b.pull = tie_pull(body, *p.poses.stage, b.origin);
   b.load = weights(body, p.gravity, p.force);
 
-  b.guess = state.x + p.elapsed * predicted_velocity(body, state, p.poses, p.elapsed);
-  place_bones(body, *p.poses.stage, b.guess);
-  fill_inactive_leaves(body, b.guess);
+  Points place = state.x + p.elapsed * predicted_velocity(body, state, p.poses, p.elapsed);
+  place_bones(body, *p.poses.stage, place);
+  fill_inactive_leaves(body, place);
+  b.guess = place - b.origin;
   return b;
 }
 
 Balance rest_balance(const Body& body, const PoseProblem& problem, const Points& guess) {
   Balance b;
   b.pose = problem.pose;
-  b.tie_target = tie_targets(body, *problem.pose);
+  b.origin = guess;
+  place_bones(body, *problem.pose, b.origin);
+  fill_inactive_leaves(body, b.origin);
+  b.pull = tie_pull(body, *problem.pose, b.origin);
   b.load = weights(body, problem.gravity, problem.force);
-  b.guess = guess;
-  place_bones(body, *problem.pose, b.guess);
-  fill_inactive_leaves(body, b.guess);
+  b.guess = Points::Zero(guess.rows(), 3);
   return b;
 }
 
-OuterForces outer_forces(const Body& body, const Balance& b, const Points& x) {
+OuterForces outer_forces(const Body& body, const Balance& b, const Points& move) {
   const LeafMatrices& m = body.matrices;
-  Points sum = b.load + b.tie_target, ties = b.tie_target, inertia = Points::Zero(x.rows(), 3);
+  Points sum = b.load + b.pull, ties = b.pull, inertia = Points::Zero(move.rows(), 3);
   const bool moving = b.inertia > 0.0;
   over_vertices(body, [&](int a) {
     const auto i = static_cast<std::size_t>(a);
     Eigen::RowVector3d both = Eigen::RowVector3d::Zero(), tied = both, carried = both;
     for (auto e = static_cast<std::size_t>(m.row_start[i]); e < static_cast<std::size_t>(m.row_start[i + 1]);
          ++e) {
-      const Eigen::RowVector3d tie = m.tie[e] * x.row(m.column[e]);
+      const Eigen::RowVector3d tie = m.tie[e] * move.row(m.column[e]);
       both -= tie;
       tied += tie;
       if (!moving) continue;
       const Eigen::RowVector3d mass =
-          (b.inertia * m.mass[e]) * (b.target.row(m.column[e]) - x.row(m.column[e]));
+          (b.inertia * m.mass[e]) * (b.target.row(m.column[e]) - move.row(m.column[e]));
       both += mass;
       carried += mass;
     }

@@ -6,19 +6,22 @@
 #include "fem/models/model.h"
 
 /// The balance of forces that models which solve the flesh as one system bring about, in a stage or at rest:
-///   inertia M (target - x) + (ties) + load - f(x) = 0  at every unknown.
+///   inertia M (target - d) + (ties) + load - f(origin + d) = 0  at every unknown.
+/// The unknown is the move d from an origin and not the position: a step of 1e-7 s moves flesh by less than
+/// the last digit of where it is, and its inertia would be that digit's.
 namespace sinew::fem {
 
-/// Everything but the elastic force f; bones included in `guess` stay where they are.
+/// Everything but the elastic force f; bones stay where `guess` moves them.
 struct Balance {
   double inertia = 0.0;               ///< mass matrix per squared step, with mass damping [1/s^2]; 0 at rest.
-  lattice::Points target;             ///< where inertia alone would take the flesh [m]; empty at rest.
-  lattice::Points tie_target;         ///< sum_b P_b (T_b X) [N]; the ties' force is that less P x.
+  lattice::Points origin;             ///< what moves are counted from [m]: of a stage its predictor x_h.
+  lattice::Points target;             ///< move that inertia alone would bring [m]; empty at rest.
+  lattice::Points pull;               ///< of the ties at the origin [N], sum_b P_b (T_b X) - P origin.
   lattice::Points load;               ///< gravity and loads [N].
   double damping = 0.0;               ///< stiffness damping, beta / (kappa h) [-]; 0 at rest.
   std::vector<PastPlace> past;        ///< what the strain's rate is measured against.
   const PosedFrames* pose = nullptr;  ///< at the solution.
-  lattice::Points guess;              ///< first guess of the solution, in the space of the unknowns [m].
+  lattice::Points guess;              ///< first guess of the move, in the space of the unknowns [m].
 };
 
 /// Of a stage. The guess moves the flesh with its frames and lets it keep its velocity relative to them.
@@ -27,12 +30,12 @@ Balance stage_balance(const Body& body, const StageProblem& problem);
 /// At rest; `guess` as it comes, with bone vertices put on the pose.
 Balance rest_balance(const Body& body, const PoseProblem& problem, const lattice::Points& guess);
 
-/// inertia M (target - x) + ties + load.
+/// inertia M (target - move) + ties + load.
 struct OuterForces {
   lattice::Points sum;  ///< num_vertices x 3 [N].
   double scale = 0.0;   ///< sum of the norms of the three: what residuals are compared with [N].
 };
-OuterForces outer_forces(const Body& body, const Balance& balance, const lattice::Points& x);
+OuterForces outer_forces(const Body& body, const Balance& balance, const lattice::Points& move);
 
 /// Sums of cell vectors at the leaf vertices, in the order of the cells.
 class CellSum {

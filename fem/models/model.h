@@ -21,6 +21,9 @@ enum class SolveStatus {
   NoConvergence,        ///< iterations ran out or no step made progress: a smaller time step may help.
 };
 
+/// Message of a solve that went well but could not reach its tolerance: nothing moved any more.
+inline constexpr std::string_view kStagnated = "stagnated at round-off";
+
 /// What a model did; `message` is one sentence that names the place.
 struct [[nodiscard]] SolveReport {
   SolveStatus status = SolveStatus::Ok;

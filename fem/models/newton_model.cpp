@@ -31,23 +31,27 @@ class NewtonModel final : public Model {
         cell_sum_(body),
         hessians_(body.mesh.cells.size()),
         gradients_(body.mesh.cells.size()),
-        energies_(body.mesh.cells.size()) {}
+        energies_(body.mesh.cells.size()) {
+    system_.assemble(1.0, 0.0, std::vector<CellStiffness>(hessians_.size(), CellStiffness::Zero()));
+    mass_diagonal_ = system_.diagonal();
+  }
 
   SolveReport prepare(double, Integrator) override { return {}; }
 
   SolveReport solve_stage(const StageProblem& problem, Points& velocity) override {
     const Balance balance = stage_balance(body_, problem);
-    Points x = balance.guess;
-    SolveReport report = solve(balance, options_.tolerance, x);
-    if (report.ok()) refuse_below(0.0, x, report);
-    if (report.ok()) velocity = (x - *problem.x_h) / (stage_of(problem.integrator).eta * problem.h);
+    Points move = balance.guess;
+    SolveReport report = solve(balance, options_.tolerance, move);
+    if (report.ok()) refuse_below(0.0, balance.origin + move, report);
+    if (report.ok()) velocity = move / (stage_of(problem.integrator).eta * problem.h);
     return report;
   }
 
   SolveReport equilibrate(const PoseProblem& problem, Points& x) override {
     const Balance balance = rest_balance(body_, problem, x);
-    Points solution = balance.guess;
-    SolveReport report = solve(balance, options_.rest_tolerance, solution);
+    Points move = balance.guess;
+    SolveReport report = solve(balance, options_.rest_tolerance, move);
+    const Points solution = balance.origin + move;
     if (report.ok()) refuse_below(energy_->least_stretch(), solution, report);
     if (report.ok()) x = solution;
     return report;
@@ -115,8 +119,16 @@ class NewtonModel final : public Model {
         name_, place_of(body_, least.cell), least.stretch, energy_->least_stretch());
   }
 
+  /// What is known at a move.
+  struct Iterate {
+    Points move, elastic, residual;  ///< residual: at the unknowns.
+    OuterForces outer;
+    double energy = 0.0;  ///< elastic.
+  };
+  Iterate iterate(const Balance& balance, Points move);
   Factor::Report factorise(const Balance& balance, const Points& x);
-  SolveReport solve(const Balance& balance, double tolerance, Points& x);
+  SolveReport solve(const Balance& balance, double tolerance, Points& move);
+  bool search(const Balance& balance, const Points& step, double unresolved, Iterate& at);
 
   std::string name_;
   const Body& body_;
@@ -129,6 +141,7 @@ class NewtonModel final : public Model {
   std::vector<CellStiffness> hessians_;
   std::vector<CellVector> gradients_;
   std::vector<double> energies_;
+  Eigen::VectorXd mass_diagonal_;  ///< of M at the unknowns.
 };
 
 Factor::Report NewtonModel::factorise(const Balance& balance, const Points& x) {
@@ -151,61 +164,84 @@ Factor::Report NewtonModel::factorise(const Balance& balance, const Points& x) {
   return factor_.factorise(system_.lower());
 }
 
-SolveReport NewtonModel::solve(const Balance& balance, double tolerance, Points& x) {
+NewtonModel::Iterate NewtonModel::iterate(const Balance& balance, Points move) {
+  Iterate at;
+  const Points x = balance.origin + move;
+  at.outer = outer_forces(body_, balance, move);
+  at.elastic = elastic_forces(x);
+  at.energy = elastic_energy(x);
+  at.residual = free_.gather(at.outer.sum - at.elastic);
+  at.move = std::move(move);
+  return at;
+}
+
+/// Goes along `step` as far as the energy falls enough. Changes below `unresolved` drown in the rounding of
+/// an energy of 1 m of flesh: there the slope has to fall instead (the approximate Wolfe condition of
+/// [Hager05]).
+bool NewtonModel::search(const Balance& balance, const Points& step, double unresolved, Iterate& at) {
+  const Points leaf_step = free_.spread(step);
+  const double slope = -at.residual.cwiseProduct(step).sum();
+  double length = 1.0;
+  for (int k = 0; k < 30; ++k, length *= 0.5) {
+    Iterate tried = iterate(balance, at.move + length * leaf_step);
+    // The outer forces are linear in the move: their potential's change is exact as a mean.
+    const double change = tried.energy - at.energy -
+                          0.5 * length * (at.outer.sum + tried.outer.sum).cwiseProduct(leaf_step).sum();
+    const double noise = 1e-13 * (std::abs(at.energy) + std::abs(tried.energy));
+    bool enough = change <= 1e-4 * length * slope + noise;
+    if (!enough && -length * slope <= unresolved)
+      enough = std::abs(tried.residual.cwiseProduct(step).sum()) <= 0.9 * std::abs(slope);
+    if (!enough) continue;
+    at = std::move(tried);
+    return true;
+  }
+  return false;
+}
+
+SolveReport NewtonModel::solve(const Balance& balance, double tolerance, Points& move) {
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   energy_->set_damping(balance.damping, balance.past);
   SolveReport report;
-  OuterForces outer = outer_forces(body_, balance, x);
-  Points elastic = elastic_forces(x);
-  double energy = elastic_energy(x);
-  Points residual = free_.gather(outer.sum - elastic);
-  const double extent = x.rowwise().norm().maxCoeff();
-  double rounding = 0.0;  ///< what is left of a residual that is zero.
+  Iterate at = iterate(balance, move);
+  const double extent = (balance.origin + move).rowwise().norm().maxCoeff();
+  double rounding = 0.0;  ///< what is left of a residual that is zero, of the elastic forces.
+  const auto stagnated = [&] {
+    report.message = kStagnated;
+    move = at.move;
+    return report;
+  };
   for (; report.iterations < options_.max_iterations; ++report.iterations) {
-    const double scale = outer.scale + elastic.norm();
-    report.residual = residual.norm() / std::max(scale, std::numeric_limits<double>::min());
+    const double scale = at.outer.scale + at.elastic.norm();
+    report.residual = at.residual.norm() / std::max(scale, std::numeric_limits<double>::min());
     if (!std::isfinite(report.residual)) break;
-    if (residual.norm() <= tolerance * scale + rounding) return report;
-    const Factor::Report factor = factorise(balance, x);
+    if (at.residual.norm() <= tolerance * scale) {
+      move = at.move;
+      return report;
+    }
+    const Factor::Report factor = factorise(balance, balance.origin + at.move);
     if (!factor.ok) {
       report.status = SolveStatus::NotPositiveDefinite;
       report.message = name_ + ": " + factor.message;
-      name_worst_cell(body_, x, free_.spread(residual), report);
+      name_worst_cell(body_, balance.origin + at.move, free_.spread(at.residual), report);
       return report;
     }
-    rounding = 4.0 * std::numeric_limits<double>::epsilon() * system_.diagonal().norm() * extent;
-    if (residual.norm() <= rounding) return report;
-
-    Eigen::VectorXd direction = Eigen::Map<const Eigen::VectorXd>(residual.data(), residual.size());
+    Eigen::VectorXd direction = Eigen::Map<const Eigen::VectorXd>(at.residual.data(), at.residual.size());
     factor_.solve(direction);
-    const Points step = Eigen::Map<const Points>(direction.data(), residual.rows(), 3);
-    const Points leaf_step = free_.spread(step);
-    const double slope = -residual.cwiseProduct(step).sum();
-    double length = 1.0;
-    bool accepted = false;
-    for (int k = 0; k < 30; ++k, length *= 0.5) {
-      const Points tried = x + length * leaf_step;
-      const OuterForces tried_outer = outer_forces(body_, balance, tried);
-      const double tried_energy = elastic_energy(tried);
-      // The outer forces are linear in x: their potential's change is exact as a mean.
-      const double change =
-          tried_energy - energy - 0.5 * length * (outer.sum + tried_outer.sum).cwiseProduct(leaf_step).sum();
-      const double noise = 1e-13 * (std::abs(energy) + std::abs(tried_energy));
-      if (!(change <= 1e-4 * length * slope + noise)) continue;
-      x = tried;
-      outer = tried_outer;
-      energy = tried_energy;
-      accepted = true;
-      break;
-    }
-    if (!accepted) break;
-    if (length * leaf_step.cwiseAbs().maxCoeff() <= 1e-15 * extent) return report;  // nothing moves any more
-    elastic = elastic_forces(x);
-    residual = free_.gather(outer.sum - elastic);
+    const Points step = Eigen::Map<const Points>(direction.data(), at.residual.rows(), 3);
+
+    // Elastic forces are exact to the last digit of the places only. What that digit moves, with the inertia
+    // against it, is as near as the balance can be found, however stiff some of the flesh is.
+    const Eigen::ArrayXd diagonal = system_.diagonal().array();
+    const Eigen::ArrayXd elastic = (diagonal - balance.inertia * mass_diagonal_.array()).max(0.0);
+    rounding = 4.0 * kEpsilon * extent * elastic.matrix().norm();
+    if ((direction.array().abs() * diagonal <= 4.0 * kEpsilon * extent * elastic).all()) return stagnated();
+    if (!search(balance, step, kEpsilon * extent * extent * elastic.matrix().norm(), at)) break;
   }
+  if (at.residual.norm() <= rounding) return stagnated();
   report.status = SolveStatus::NoConvergence;
   report.message = fmt::format("{}: no balance of forces after {} iterations, residual {:.2g} of the forces",
                                name_, report.iterations, report.residual);
-  name_worst_cell(body_, x, free_.spread(residual), report);
+  name_worst_cell(body_, balance.origin + at.move, free_.spread(at.residual), report);
   return report;
 }
 

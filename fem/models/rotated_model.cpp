@@ -40,11 +40,11 @@ class RotatedModel final : public Model {
 
   SolveReport solve_stage(const StageProblem& problem, Points& velocity) override {
     const Balance balance = stage_balance(body_, problem);
-    Points x = balance.guess;
-    const Rotations rotations = rotations_(x, *balance.pose);
-    const Points residual = residual_of(balance, rotations, x);
-    SolveReport report = correct(balance, rotations, residual, enough_for(problem.h, residual), x);
-    if (report.ok()) velocity = (x - *problem.x_h) / (stage_of(problem.integrator).eta * problem.h);
+    Points move = balance.guess;
+    const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
+    const Points residual = residual_of(balance, rotations, move);
+    SolveReport report = correct(balance, rotations, residual, enough_for(problem.h, residual), move);
+    if (report.ok()) velocity = move / (stage_of(problem.integrator).eta * problem.h);
     return report;
   }
 
@@ -70,10 +70,10 @@ class RotatedModel final : public Model {
     const double share = std::min(options_.loosest, options_.time_share * angle * angle);
     return std::max(options_.tolerance * scale_, share * residual.norm());
   }
-  Points residual_of(const Balance& balance, const Rotations& rotations, const Points& x);
+  Points residual_of(const Balance& balance, const Rotations& rotations, const Points& move);
   Points apply(const Balance& balance, const Rotations& rotations, const Points& dx);
   SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
-                      double enough, Points& x);
+                      double enough, Points& move);
   bool refactor(const Balance& balance, const Rotations& rotations, SolveReport& report);
   std::vector<Eigen::Matrix3d> turns_since_factor(const Rotations& rotations) const;
   void precondition(const std::vector<Eigen::Matrix3d>& turns, const Points& residual, Points& result) const;
@@ -94,7 +94,8 @@ class RotatedModel final : public Model {
 };
 
 /// Forces left over at the unknowns.
-Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations, const Points& x) {
+Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations, const Points& move) {
+  const Points x = balance.origin + move;
   std::vector<Rotations> past;
   std::vector<detail::TurnedPlace> places{{1.0 + balance.damping, &x, &rotations},
                                           {-1.0, &body_.mesh.points}};
@@ -109,7 +110,7 @@ Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotati
   Points elastic(x.rows(), 3);
   for (int a = 0; a < body_.mesh.num_vertices(); ++a)
     elastic.row(a) = cells_.cells().groups().sum_at(a, corner_forces_).transpose();
-  const OuterForces outer = outer_forces(body_, balance, x);
+  const OuterForces outer = outer_forces(body_, balance, move);
   scale_ = outer.scale + elastic.norm();
   return free_.gather(outer.sum - elastic);
 }
@@ -185,9 +186,9 @@ void RotatedModel::precondition(const std::vector<Eigen::Matrix3d>& turns, const
     result.row(i) = (turns[static_cast<std::size_t>(i)] * result.row(i).transpose()).transpose();
 }
 
-/// Adds to x the solution of the system for `residual`, but for `enough` of it [N].
+/// Adds to `move` the solution of the system for `residual`, but for `enough` of it [N].
 SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotations, const Points& residual,
-                                  double enough, Points& x) {
+                                  double enough, Points& move) {
   SolveReport report;
   const bool other = factor_inertia_ != balance.inertia || factor_damping_ != balance.damping;
   if ((other || !factor_.ok()) && !refactor(balance, rotations, report)) return report;
@@ -220,37 +221,37 @@ SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotat
     r -= length * image;
   }
   report.residual = r.norm() / std::max(scale_, std::numeric_limits<double>::min());
-  x += free_.spread(dx);
+  move += free_.spread(dx);
   return report;
 }
 
 SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
   const Balance balance = rest_balance(body_, problem, x);
-  Points solution = balance.guess;
+  Points move = balance.guess;
   SolveReport total;
   Points residual;
-  const double extent = solution.rowwise().norm().maxCoeff();
+  const double extent = balance.origin.rowwise().norm().maxCoeff();
   detail::AndersonMixing mixing(5);
   constexpr int kMixed = 200;
   for (; total.iterations < options_.max_rest_iterations; ++total.iterations) {
-    const Rotations rotations = rotations_(solution, *balance.pose);
-    residual = residual_of(balance, rotations, solution);
+    const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
+    residual = residual_of(balance, rotations, move);
     total.residual = residual.norm() / std::max(scale_, std::numeric_limits<double>::min());
     if (!std::isfinite(total.residual)) break;
     if (residual.norm() <= options_.rest_tolerance * scale_) {
-      x = solution;
+      x = balance.origin + move;
       return total;
     }
-    const Points before = solution;
+    const Points before = move;
     const SolveReport step =
-        correct(balance, rotations, residual, 0.1 * options_.rest_tolerance * scale_, solution);
+        correct(balance, rotations, residual, 0.1 * options_.rest_tolerance * scale_, move);
     if (!step.ok()) return step;
     // Mixing halves the iterations where rotations are smooth. Those of cells turned inside out jump, and
     // there patience is better.
-    if (total.iterations < kMixed)
-      solution = before + free_.spread(mixing.step(free_.gather(solution - before)));
-    if ((solution - before).cwiseAbs().maxCoeff() <= 1e-15 * extent) {
-      x = solution;
+    if (total.iterations < kMixed) move = before + free_.spread(mixing.step(free_.gather(move - before)));
+    if ((move - before).cwiseAbs().maxCoeff() <= 1e-15 * extent) {
+      x = balance.origin + move;
+      total.message = kStagnated;
       return total;
     }
   }
@@ -258,7 +259,7 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
   total.message = fmt::format(
       "{}: no balance of forces after {} iterations, residual {:.2g} of the forces; hint: neo-hookean", name_,
       total.iterations, total.residual);
-  name_worst_cell(body_, solution, free_.spread(residual), total);
+  name_worst_cell(body_, balance.origin + move, free_.spread(residual), total);
   return total;
 }
 
