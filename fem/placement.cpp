@@ -39,6 +39,17 @@ Points carried(const Body& body, const Points& x, const PosedFrames& from, const
   return moved;
 }
 
+Points turned(const Body& body, const Points& v, const PosedFrames& from, const PosedFrames& to) {
+  Points result = Points::Zero(v.rows(), 3);
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+      const auto f = static_cast<std::size_t>(it.col());
+      result.row(a) += it.value() * v.row(a) * from.frames[f].rotation * to.frames[f].rotation.transpose();
+    }
+  }
+  return result;
+}
+
 void place_bones(const Body& body, const PosedFrames& posed, Points& x) {
   for (const BoneVertex& bone : body.bones.vertices)
     x.row(bone.vertex) = bone_position(bone, posed.joints).transpose();

@@ -17,6 +17,10 @@ lattice::Points skinned_frames(const Body& body, const PosedFrames& posed);
 lattice::Points carried(const Body& body, const lattice::Points& x, const PosedFrames& from,
                         const PosedFrames& to);
 
+/// v = sum_f s_f R_f^to R_f^from^T v: velocities turned with the frames.
+lattice::Points turned(const Body& body, const lattice::Points& v, const PosedFrames& from,
+                       const PosedFrames& to);
+
 /// Puts bone vertices exactly on the clip.
 void place_bones(const Body& body, const PosedFrames& posed, lattice::Points& x);
 

@@ -75,6 +75,13 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
   before_ = state_;
 }
 
+PosedFrames Simulation::pose_at(double time) const {
+  if (!held_) return pose_frames(body_.tree, motion_(time), time);
+  PosedFrames held = *held_;
+  held.time = time;
+  return held;
+}
+
 /// The status of a solve that failed, with the time of the state it started from.
 SimulationReport Simulation::failed(const SolveReport& solve) const {
   SimulationReport report;
@@ -89,9 +96,9 @@ bool Simulation::check(SimulationReport& report) const {
   int worst = -1;
   for (Eigen::Index a = 0; a < state_.x.rows() && worst < 0; ++a) {
     const bool finite = state_.x.row(a).allFinite() && state_.v.row(a).allFinite();
-    // Flesh a hundred lengths from its bones has left for good; say so while the numbers still name a place.
     if (!finite) worst = static_cast<int>(a);
   }
+  // Flesh a hundred lengths from its bones has left for good; say so while the numbers still name a place.
   if (worst < 0) {
     const Points home = skinned_frames(body_, now_);
     double farthest = 0.0;
@@ -324,11 +331,51 @@ SolveReport Simulation::tr_bdf2_step(double h, const PosedFrames& next, State& a
   return bdf2_stage(middle, {&now_, &posed, &next}, h, after);
 }
 
+bool Simulation::jumps_to(const PosedFrames& next) const {
+  for (std::size_t f = 0; f < next.frames.size(); ++f) {
+    const Eigen::Vector3d& origin = body_.tree.frames[f].origin_rest;
+    if ((next.frames[f].from_rest * origin - now_.frames[f].from_rest * origin).norm() >
+        kCutJump * body_.size)
+      return true;
+  }
+  return false;
+}
+
+/// The step begins where the frames land, with flesh that stands among them as before, and they stand still.
+SimulationReport Simulation::step_after_cut(double h, const PosedFrames& next) {
+  const State state = state_;
+  const PosedFrames now = now_, past = past_;
+  const std::optional<StepEnd> step_end = step_end_;
+  const bool has_before = has_before_;
+
+  now_ = next;
+  now_.time = now.time;
+  state_.x = carried(body_, state.x, now, now_);
+  place_bones(body_, now_, state_.x);
+  fill_inactive_leaves(body_, state_.x);
+  state_.v = turned(body_, state.v, now, now_);
+  state_.x_past.resize(0, 3);
+  state_.v_past.resize(0, 3);
+  step_end_.reset();
+  has_before_ = false;
+  held_ = next;
+  const SimulationReport report = step_once(h);
+  held_.reset();
+  if (report.steps == 1) return report;
+  state_ = state;
+  now_ = now;
+  past_ = past;
+  step_end_ = step_end;
+  has_before_ = has_before;
+  return report;
+}
+
 SimulationReport Simulation::step_once(double h) {
+  PosedFrames next = pose_at(state_.time + h);
+  if (info_->dynamic && jumps_to(next)) return step_after_cut(h, next);
   SimulationReport report;
   SolveReport solve = model_->prepare(h, options_.integrator);
   if (!solve.ok()) return failed(solve);
-  PosedFrames next = pose_at(state_.time + h);
   State after;
   after.time = state_.time + h;
   switch (options_.integrator) {

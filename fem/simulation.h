@@ -48,6 +48,10 @@ struct SimulationReport {
   std::string message;
 };
 
+/// A frame that moves farther than this between two steps, in sizes of the body [-], was not moved but cut:
+/// nobody means the flesh to be dragged over a hundred of its lengths in a second.
+inline constexpr double kCutJump = 1.0;
+
 class Simulation {
  public:
   /// Starts at rest in the pose of `start_time`. `body` must outlive it. `should_stop` is asked after every
@@ -60,6 +64,8 @@ class Simulation {
   [[nodiscard]] SimulationReport settle();
 
   /// Steps, or sub-steps where a frame turns fast or the model's solve fails, until state().time >= time;
+  /// where a frame jumps by more than kCutJump the flesh is carried along with the frames, its velocity kept:
+  /// a cut gives it no push.
   /// does nothing when it is there already. Throws std::invalid_argument naming joint and time where the
   /// motion gives a frame that is not finite or has no volume; the state stays the last good one.
   [[nodiscard]] SimulationReport advance_to(double time);
@@ -68,6 +74,7 @@ class Simulation {
   /// clip's.
   void set_velocity(const lattice::Points& velocity);
 
+  const Body& body() const { return body_; }
   const State& state() const { return state_; }
   /// Leaf vertices at a time between the last two states, moved in bone coordinates; bone vertices exactly on
   /// the clip.
@@ -80,9 +87,11 @@ class Simulation {
   SolverCounts counts() const { return model_->counts(); }
 
  private:
-  PosedFrames pose_at(double time) const { return pose_frames(body_.tree, motion_(time), time); }
+  PosedFrames pose_at(double time) const;
   int halvings_for(double begin, double h) const;
   SimulationReport step_once(double h);
+  bool jumps_to(const PosedFrames& next) const;
+  SimulationReport step_after_cut(double h, const PosedFrames& next);
   /// One stage to now + eta h, extrapolated to now + span with the pose `next`.
   SolveReport stage_without_history(double span, double h, const PosedFrames& next, State& after);
   /// One stage of BDF2 to poses.stage from a state and the one before it.
@@ -117,6 +126,7 @@ class Simulation {
     double h = 0.0;  ///< [s].
   };
   std::optional<StepEnd> step_end_;  ///< empty before the first step.
+  std::optional<PosedFrames> held_;  ///< during a step after a cut: the pose that stands still.
   long base_step_ = 0;               ///< whole steps taken: time is start + n h, never a running sum.
   int part_ = 0;  ///< sub-steps taken of the step under way: a frame may be sampled between two of them.
   int halvings_ = 0;
