@@ -68,6 +68,27 @@ CellMeasure measure_cell(const Body& body, std::size_t c, const lattice::Points&
   return out;
 }
 
+/// 1/2 sum_b (x - T_b X)^T P_b (x - T_b X), of which only the sum of the P_b and every P_b T_b X are known;
+/// places are counted from the first tie's centre, so that far from the origin no digits are lost.
+double tie_energy(const Body& body, const lattice::Points& x, const PosedFrames& posed,
+                  const Growth* growth) {
+  const Eigen::Vector3d origin =
+      tie_target(body, body.ties.front(), posed, growth) * body.ties.front().centre_rest;
+  const lattice::Points from = x.rowwise() - origin.transpose();
+  double energy = 0.5 * from.cwiseProduct(apply_tie(body.matrices, from)).sum();
+  for (const Tie& tie : body.ties) {
+    const Eigen::Affine3d map = tie_target(body, tie, posed, growth);
+    const Eigen::Vector3d centre = map * tie.centre_rest - origin;
+    for (std::size_t k = 0; k < tie.vertices.size(); ++k) {
+      const Eigen::Vector3d pull = map.linear() * tie.first[k] + tie.zeroth[k] * centre,
+                            arm = body.mesh.points.row(tie.vertices[k]).transpose() - tie.centre_rest,
+                            target = map.linear() * arm + centre;
+      energy += pull.dot(0.5 * target - from.row(tie.vertices[k]).transpose());
+    }
+  }
+  return energy;
+}
+
 /// Weight-blended rotation of a cell's frames.
 Eigen::Matrix3d cell_rotation(const Body& body, std::size_t c, const PosedFrames& posed) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
@@ -100,6 +121,7 @@ Measures measure(const Body& body, const lattice::Points& x, const lattice::Poin
     }
     if (cells[c].det <= 0.0) ++m.inverted_cells;
   }
+  if (!body.ties.empty()) m.ties = tie_energy(body, x, posed, grown ? &*grown : nullptr);
   m.kinetic = 0.5 * v.cwiseProduct(apply_mass(body.matrices, v)).sum();
   for (int a = 0; a < body.mesh.num_vertices(); ++a) {
     m.potential -= body.vertex_mass[static_cast<std::size_t>(a)] *

@@ -10,6 +10,7 @@ struct Measures {
   double kinetic = 0.0;        ///< 1/2 v^T M v [J].
   double elastic = 0.0;        ///< 1/2 u^T K u, u of each cell in the rotation of its dominant frames [J].
   double potential = 0.0;      ///< -m g . x, relative to the rest pose's [J].
+  double ties = 0.0;           ///< sum over ties of kappa/2 int |p - T_b r|^2 dV [J].
   double largest_speed = 0.0;  ///< [m/s].
   double bone_residual = 0.0;  ///< largest distance of a bone vertex from the clip [m].
   double largest_strain =

@@ -36,6 +36,33 @@ TEST(Measures, ARigidDisplacementHasNoElasticEnergy) {
   }
 }
 
+// Flesh moved with its bones strains no tie; shifted from there by d, each gives kappa V / 2 |d|^2, whatever
+// the tubes' shapes: kappa V is the sum of the tie's forces on a unit shift.
+TEST(Measures, TiesStoreWhatAShiftAgainstTheBonesTakes) {
+  const Body body = tests::arm_body(tests::make_arm(), 2.0);
+  ASSERT_FALSE(body.ties.empty());
+  const Points still = Points::Zero(body.mesh.num_vertices(), 3);
+  const Eigen::Vector3d shift(0.01, -0.02, 0.03);
+  double unit = 0.0;
+  for (const Tie& tie : body.ties) {
+    for (double force : tie.zeroth) unit += force;
+  }
+  for (double far : {0.0, 1000.0}) {
+    Eigen::Affine3d map(Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.6, 0.0, 0.8)));
+    map.pretranslate(Eigen::Vector3d(far, 0.0, -far));
+    const PosedFrames posed = pose_frames(body.tree, tests::arm_pose(0.0, map), 0.0);
+    const auto ties = [&](const Points& x) {
+      return measure(body, x, still, posed, Eigen::Vector3d::Zero()).ties;
+    };
+    const Points home = moved(body.mesh.points, map);
+    const double expected = 0.5 * unit * shift.squaredNorm();
+    // A place's last digit is eps (1 + far) of 1 m; energies of unit / 2 cancel.
+    const double rounding = 20.0 * 2.3e-16 * unit + 20.0 * 2.3e-16 * (1.0 + 2.0 * far) * unit * shift.norm();
+    EXPECT_NEAR(ties(home), 0.0, rounding);
+    EXPECT_NEAR(ties(home.rowwise() + shift.transpose()), expected, rounding);
+  }
+}
+
 // A constant stretch diag(1 + a, 1 + b, 1 + c) in the frame: every measure has a closed form.
 TEST(Measures, OfAConstantStretchAreThoseOfTheClosedForm) {
   const Body body = tests::arm_body(tests::make_arm(), 2.0);
