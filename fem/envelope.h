@@ -1,7 +1,11 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <string_view>
+#include <vector>
+
+#include "fem/simulation.h"
 
 /// The settings inside which runs end well on every rung, as the tests of extremes show: random scenes are
 /// drawn from here, and what lies outside gets a warning.
@@ -24,5 +28,23 @@ inline constexpr TestedRange kTestedDampingFrequency{"damping_frequency", 1.0, 3
 
 inline constexpr std::array kEnvelope{kTestedStep,    kTestedYoung,   kTestedPoisson,
                                       kTestedDensity, kTestedDamping, kTestedDampingFrequency};
+
+/// Of motions, from one step to the next.
+inline constexpr double kTestedTurn = 90.0;      ///< of a bone [degrees].
+inline constexpr double kTestedJump = kCutJump;  ///< of a bone's end, in sizes of the body [-].
+inline constexpr double kTestedStretch = 10.0;   ///< of a bone, and one over it the least [-].
+/// Change of a bone's velocity, in speeds of sound of the softest flesh, sqrt(E / rho) [-].
+inline constexpr double kTestedJolt = 1.0;
+
+/// Weight of the softest flesh over its stiffness, rho g size / E [-], under which `stvk` is tested: a
+/// heavier body may squeeze itself below the least stretch of that law.
+inline constexpr double kTestedWeightOfStvk = 0.03;
+/// Longest edge of a cell of the lattice over its shortest [-].
+inline constexpr double kTestedAspect = 1000.0;
+
+/// One sentence for each of these that body and motion leave, with the cell, or the bone and the time, where
+/// they do so most. `steps` steps of options.step from `first` [s].
+std::vector<std::string> outside_envelope(const Body& body, const Motion& motion,
+                                          const SimulationOptions& options, double first, long steps);
 
 }  // namespace sinew::fem

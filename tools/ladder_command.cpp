@@ -138,6 +138,7 @@ int run_ladder_command(const LadderRequest& request) {
   if (!converged.of_height)
     throw assets::ConfigError(fmt::format(
         "--converged: got '{}', expected a percentage of the height; hint: 0.5%", request.converged));
+  for (const std::string& warning : outside_envelope(scene)) std::cerr << "warning: " << warning << '\n';
   const Ladder ladder = run_ladder(scene, grid, converged.value, request.output,
                                    [](const std::string& line) { std::cerr << line << '\n'; });
   const std::string settings = print_scene(scene);

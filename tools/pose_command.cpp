@@ -180,6 +180,7 @@ void find_pose(const PoseRequest& request) {
         ": bone: none and no fixed side, expected something that holds the flesh at rest; hint: [[fixed]] "
         "face = \"x-min\"");
   if (scene.plain && scene.plain->velocity) talk("warning: a pose is at rest: the velocity does nothing");
+  for (const std::string& warning : outside_envelope(scene)) talk("warning: " + warning);
   assets::OutputDirectory out(
       scene.output, scene.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse, kPoseOutputs);
   const Character character = make_character(scene, talk);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -20,6 +21,7 @@
 #include "assets/pc2.h"
 #include "assets/preview.h"
 #include "assets/sidecar.h"
+#include "fem/envelope.h"
 #include "fem/placement.h"
 #include "tools/body_fields.h"
 #include "tools/character.h"
@@ -296,6 +298,10 @@ void simulate(const Scene& scene, const Talk& talk) {
   lap("assemble");
   const auto motion = [&](double time) { return character.pose(time); };
   const double first = character.the_clip().start + frames.first / scene.fps;
+  for (const std::string& warning :
+       fem::outside_envelope(body, motion, simulation_options(scene), first,
+                             std::lround((frames.last - frames.first) / (scene.fps * scene.step))))
+    talk("warning: " + warning);
   fem::Simulation simulation(body, motion, first, simulation_options(scene),
                              [] { return interrupt_signal() != 0; });
   const fem::SimulationReport settled = simulation.settle();
