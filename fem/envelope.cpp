@@ -67,7 +67,7 @@ std::pair<std::size_t, double> most_oblong(const lattice::CellComplex& complex) 
 std::vector<std::string> outside_envelope(const Body& body, const Motion& motion,
                                           const SimulationOptions& options, double first, long steps) {
   const double step = options.step;
-  Worst turn, jump, jolt, stretch;
+  Worst turn, jump, jolt, stretch, squeeze;
   PosedFrames before;
   std::vector<Eigen::Vector3d> ends_before, moved_before;
   for (long k = 0; k <= steps; ++k) {
@@ -79,7 +79,8 @@ std::vector<std::string> outside_envelope(const Body& body, const Motion& motion
       const lattice::LatticeBone& bone = body.lattice.bones[b];
       const double length = (bone.rest_end - bone.rest_start).norm();
       const double posed = (ends[2 * b + 1] - ends[2 * b]).norm();
-      stretch.see(std::max(posed / length, length / posed), time, bone.name);
+      stretch.see(posed / length, time, bone.name);
+      squeeze.see(length / posed, time, bone.name);
       if (k == 0) continue;
       for (std::size_t e : {2 * b, 2 * b + 1}) {
         moved[e] = ends[e] - ends_before[e];
@@ -112,19 +113,24 @@ std::vector<std::string> outside_envelope(const Body& body, const Motion& motion
                     cell, aspect, kTestedAspect));
   const double sound = slowest_sound(body);  // sqrt(E / rho)
   const double weight = options.gravity.norm() * body.size / (sound * sound);
-  if (options.model == "stvk" && weight > kTestedWeightOfStvk)
+  const double bears = options.model == "stvk" ? kTestedWeightOfStvk : kTestedWeight;
+  if (weight > bears)
     warnings.push_back(
-        fmt::format("model stvk: the weight of the flesh, rho g size / E, is {:.3g}, where it is "
-                    "tested up to {:g}; hint: neo-hookean",
-                    weight, kTestedWeightOfStvk));
+        fmt::format("model {}: the weight of the flesh, rho g size / E, is {:.3g}, where it is "
+                    "tested up to {:g}",
+                    options.model, weight, bears));
   // Rounding of a motion by exactly the limit is not outside of it.
   warn(turn, kTestedTurn * (1.0 + 1e-9), fmt::format("turns by {:.3g} degrees", turn.value));
   warn(jump, kTestedJump * (1.0 + 1e-9),
        fmt::format("jumps by {:.3g} sizes of the body, so the flesh is carried along,", jump.value));
   warn(jolt, kTestedJolt * sound,
-       fmt::format("changes its velocity by {:.3g} m/s, faster than sound in the flesh,", jolt.value));
+       fmt::format("changes its velocity by {:.3g} m/s ({:.3g} times sound in the flesh)", jolt.value,
+                   jolt.value / sound));
   warn(stretch, kTestedStretch * (1.0 + 1e-9),
-       fmt::format("has {:.3g} times its length or one over that", stretch.value));
+       fmt::format("is drawn to {:.3g} times its length", stretch.value));
+  const double least = options.model == "stvk" ? kTestedSqueezeOfStvk : kTestedSqueeze;
+  warn(squeeze, (1.0 + 1e-9) / least,
+       fmt::format("is squeezed to one part in {:.3g} of its length", squeeze.value));
   return warnings;
 }
 

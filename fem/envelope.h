@@ -30,14 +30,17 @@ inline constexpr std::array kEnvelope{kTestedStep,    kTestedYoung,   kTestedPoi
                                       kTestedDensity, kTestedDamping, kTestedDampingFrequency};
 
 /// Of motions, from one step to the next.
-inline constexpr double kTestedTurn = 90.0;      ///< of a bone [degrees].
-inline constexpr double kTestedJump = kCutJump;  ///< of a bone's end, in sizes of the body [-].
-inline constexpr double kTestedStretch = 10.0;   ///< of a bone, and one over it the least [-].
+inline constexpr double kTestedTurn = 90.0;          ///< of a bone [degrees].
+inline constexpr double kTestedJump = kCutJump;      ///< of a bone's end, in sizes of the body [-].
+inline constexpr double kTestedStretch = 10.0;       ///< length of a bone over its rest length [-].
+inline constexpr double kTestedSqueeze = 0.1;        ///< the same, at the least.
+inline constexpr double kTestedSqueezeOfStvk = 0.8;  ///< which buckles first and then gives up.
 /// Change of a bone's velocity, in speeds of sound of the softest flesh, sqrt(E / rho) [-].
-inline constexpr double kTestedJolt = 1.0;
+inline constexpr double kTestedJolt = 0.5;
 
-/// Weight of the softest flesh over its stiffness, rho g size / E [-], under which `stvk` is tested: a
-/// heavier body may squeeze itself below the least stretch of that law.
+/// Weight of the softest flesh over its stiffness, rho g size / E [-]: of a heavier body linear flesh may sag
+/// by a hundred of its lengths, and StVK's is squeezed below the least stretch of its law long before.
+inline constexpr double kTestedWeight = 10.0;
 inline constexpr double kTestedWeightOfStvk = 0.03;
 /// Longest edge of a cell of the lattice over its shortest [-].
 inline constexpr double kTestedAspect = 1000.0;

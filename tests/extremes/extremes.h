@@ -1,146 +1,159 @@
 #pragma once
 
-#include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <filesystem>
-#include <fstream>
+#include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "fem/equilibrium.h"
 #include "fem/models/model.h"
 #include "fem/simulation.h"
 #include "tests/fem/arm.h"
 #include "tests/fem/bar.h"
 
 /// Settings far from ordinary, on every rung that moves. Whatever they are, a run ends well or with a failure
-/// that has a name, and no number that it gives is infinite or none. Every row writes what became of it to
-/// extremes/<row>.md in the build folder.
+/// that has a name, and no number that it gives is infinite or none. Every row of the catalogue is one test
+/// and writes what became of it to extremes/<row>.md in the build folder (extremes/nightly/ of the long
+/// runs), and table.md beside it says how all rows stand on every rung.
 namespace sinew::tests {
 
+using fem::Body;
+using fem::Integrator;
+using fem::Motion;
+using fem::Simulation;
+using fem::SimulationOptions;
+using lattice::Points;
+
 /// True in the program that runs at night: as long and as many runs as are wanted, not as fit.
-#ifdef SINEW_NIGHTLY
-inline constexpr bool kNightly = true;
-#else
-inline constexpr bool kNightly = false;
-#endif
+extern const bool kNightly;
 
-inline std::vector<std::string> dynamic_rungs() {
-  std::vector<std::string> names;
-  for (const fem::ModelInfo& model : fem::models()) {
-    if (model.dynamic) names.emplace_back(model.name);
-  }
-  return names;
-}
+inline constexpr double kFrame = 1.0 / 60.0;                       ///< [s].
+inline const fem::Material kFirm{1e6, 0.3, 1000.0};                ///< of the short bar: 2 Hz.
+inline const fem::Damping kDamped{0.1, 2.0};                       ///< a tenth of critical there.
+inline const fem::Damping kCritical{1.0, 2.0};                     ///< a second leaves exp(-12.6).
+inline const Eigen::Vector3d kNoWeight = Eigen::Vector3d::Zero();  ///< [m/s^2].
+inline const Eigen::Vector3d kWeight{0.0, 0.0, -1.0};              ///< sags the short bar by 6 mm.
 
+std::vector<std::string> dynamic_rungs();
 /// The finite-element rungs: at small strain all of them are the same linear body.
-inline std::vector<std::string> element_rungs() {
-  std::vector<std::string> names = dynamic_rungs();
-  std::erase(names, "springs");
-  return names;
-}
+std::vector<std::string> element_rungs();
 
-/// What became of one run.
+std::string name_of(Integrator integrator);
+
+/// A run to make.
+struct ExtremeScene {
+  const Body& body;
+  Motion motion;
+  SimulationOptions options;
+  int steps = 0;
+  /// From when the bones stand still, if they do: the energy of the flesh must not grow from there [s].
+  double held_from = std::numeric_limits<double>::infinity();
+  Points velocity{};  ///< at the start; empty: none.
+};
+
+/// What became of a run.
 struct Extreme {
   bool ok = false;       ///< it ran to its end.
   std::string failure;   ///< else its name.
-  lattice::Points x, v;  ///< at the end, or the last good ones.
-  double energy = 0.0;   ///< at the end: kinetic, elastic and potential [J].
-  double most = 0.0;     ///< largest energy of all steps [J].
-  double late = 0.0;     ///< largest kinetic energy in the last quarter of the steps [J].
-  double early = 0.0;    ///< and in the first quarter [J].
+  Points x, v;           ///< at the end, or the last good ones.
+  double time = 0.0;     ///< then [s].
+  double energy = 0.0;   ///< then: kinetic, elastic and potential [J].
+  double elastic = 0.0;  ///< the largest of all steps [J].
+  double early = 0.0;    ///< largest kinetic energy in the first quarter of the steps [J].
+  double late = 0.0;     ///< and in the last [J].
+                         /// By how much the energy rose over that of the first two states in which the bones
+                         /// stood still, over the
+  /// largest kinetic or stored energy since [-].
+  double growth = 0.0;
+  double rise = 0.0;     ///< and over the least energy before, in the same measure [-].
+  int inverted = 0;      ///< cells at the end.
+  int steps = 0;         ///< taken, parts of steps included.
   double seconds = 0.0;  ///< processor time.
 };
 
-/// Runs `steps` steps and asks at each of them what holds for every run.
-inline Extreme run_extreme(fem::Simulation& simulation, double step, int steps) {
-  Extreme result;
-  const std::clock_t start = std::clock();
-  for (int k = 1; k <= steps; ++k) {
-    const fem::SimulationReport report =
-        simulation.advance_to(simulation.state().time + 0.5 * step);  // one step; halves are no matter
-    result.x = simulation.state().x;
-    result.v = simulation.state().v;
-    if (report.status != fem::SimulationStatus::Ok) {
-      result.failure = report.message.empty() ? "(no name)" : report.message;
-      EXPECT_FALSE(report.message.empty());
-      break;
-    }
-    if (!result.x.allFinite() || !result.v.allFinite()) {
-      ADD_FAILURE() << "a number that is none, and no failure, in step " << k;
-      return result;
-    }
-    const fem::Measures m = simulation.measures_at(simulation.state().time);
-    const double extent = 1.0 + result.x.rowwise().norm().maxCoeff();
-    EXPECT_LE(m.bone_residual, 1e-9 * extent) << "step " << k;
-    result.energy = m.kinetic + m.elastic + m.potential;
-    result.most = std::max(result.most, result.energy);
-    if (4 * k <= steps) result.early = std::max(result.early, m.kinetic);
-    if (4 * k > 3 * steps) result.late = std::max(result.late, m.kinetic);
-  }
-  result.ok = result.failure.empty();
-  result.seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-  return result;
-}
+/// Runs `steps` steps and asks at each of them what holds for every run: finite numbers, bones in their
+/// places, a name for every failure. `look` is called after every step that went well.
+Extreme run_extreme(Simulation& simulation, double step, int steps,
+                    double held_from = std::numeric_limits<double>::infinity(),
+                    const std::function<void(const Simulation&)>& look = {});
+/// The same from the start of a scene, and once more where the bits are to be the same the second time: every
+/// scene of the nightly runs.
+Extreme run_extreme(const ExtremeScene& scene, const std::function<void(const Simulation&)>& look = {},
+                    bool twice = kNightly);
+
+/// Where flesh rests under gravity on bones in their rest pose; a failure of the test where there is no rest.
+Points rest_of(const Body& body, const std::string& rung, const Eigen::Vector3d& gravity);
 
 inline std::vector<Eigen::Affine3d> still_base(double) { return {Eigen::Affine3d::Identity()}; }
+/// About the y axis.
+Eigen::Affine3d turned(double degrees);
+/// The rest shape moved by a map.
+Points moved(const Body& body, const Eigen::Affine3d& base);
 
-/// A short bar, 4 x 2 x 2 leaf cells, clamped at x = 0.
-inline fem::Body short_bar(const fem::Material& material, const fem::Damping& damping, double size = 1.0) {
-  BarOptions options;
-  options.box.min = Eigen::Vector3d(0.0, -0.2, -0.2) * size;
-  options.box.max = Eigen::Vector3d(1.0, 0.2, 0.2) * size;
-  options.box.blocks = {2, 1, 1};
-  options.material = material;
-  options.damping = damping;
-  return bar_body(options);
-}
+/// A short bar, 1 x 0.4 x 0.4 m of 4 x 2 x 2 leaf cells, clamped at x = 0.
+BarOptions short_bar_options(const fem::Material& material, const fem::Damping& damping, double size = 1.0);
+Body short_bar(const fem::Material& material, const fem::Damping& damping, double size = 1.0);
 
-inline fem::SimulationOptions extreme_options(const std::string& model, double step,
-                                              const Eigen::Vector3d& gravity,
-                                              fem::Integrator integrator = fem::Integrator::Bdf2) {
-  fem::SimulationOptions options;
-  options.model = model;
-  options.step = step;
-  options.gravity = gravity;
-  options.integrator = integrator;
-  return options;
-}
+SimulationOptions extreme_options(const std::string& model, double step, const Eigen::Vector3d& gravity,
+                                  Integrator integrator = Integrator::Bdf2);
 
 /// A small arm: two bones of two cells each.
-inline Arm small_arm() { return make_arm(lattice::CellType::Hexahedron, 0, 2); }
+Arm small_arm();
+Body small_arm_body(const Arm& arm, double largest_bend);
 
-inline fem::Body small_arm_body(const Arm& arm, double largest_bend) {
-  fem::BodyOptions options;
-  options.levels = 0;
-  return arm_body(arm, largest_bend, options);
-}
+/// Natural modes of a bar on its clamp, without damping, lowest first.
+struct Modes {
+  Eigen::VectorXd omega;  ///< [rad/s].
+  Eigen::MatrixXd shape;  ///< columns over the free unknowns, normalised by the mass.
+  FreeSystem system;
 
-/// The rows of one test as a table in the build folder.
-class ExtremesTable {
- public:
-  explicit ExtremesTable(const std::string& row) : row_(row) {}
-  ~ExtremesTable() {
-    const std::filesystem::path folder = std::filesystem::path(SINEW_BINARY_DIR) / "extremes";
-    std::filesystem::create_directories(folder);
-    std::ofstream file(folder / (row_ + ".md"));
-    file << "| row | setting | rung | outcome | s |\n|---|---|---|---|---|\n" << lines_;
-  }
-  void add(const std::string& setting, const std::string& rung, const Extreme& run) {
-    lines_ += fmt::format("| {} | {} | {} | {} | {:.2g} |\n", row_, setting, rung,
-                          run.ok ? "passed" : run.failure, run.seconds);
-  }
-
- private:
-  std::string row_, lines_;
+  /// A mode at the leaf vertices.
+  Points at_leaves(Eigen::Index mode) const { return leaf_values(system, shape.col(mode)); }
 };
+Modes modes_of(const Body& body);
 
 /// Largest distance of two placements over `size`.
-inline double distance(const lattice::Points& a, const lattice::Points& b, double size = 1.0) {
-  return (a - b).rowwise().norm().maxCoeff() / size;
-}
+double distance(const Points& a, const Points& b, double size = 1.0);
+/// Largest row.
+double largest(const Points& a);
+
+/// What became of one row of the catalogue on every rung: a file in the build folder.
+class ExtremesTable {
+ public:
+  /// `asks`: what the catalogue asks of the row, in words.
+  ExtremesTable(std::string row, std::string asks);
+  ~ExtremesTable();
+  ExtremesTable(const ExtremesTable&) = delete;
+  ExtremesTable& operator=(const ExtremesTable&) = delete;
+
+  /// A run that passed or failed by a name. `must`: failing is a failure of the test.
+  void add(const std::string& setting, const std::string& rung, const Extreme& run, bool must = true);
+  /// The same without a line of its own where it passed: for rows of thousands of runs.
+  void count(const std::string& setting, const std::string& rung, const Extreme& run);
+  /// A number of the last line's run and what it may be at most.
+  void at_most(const std::string& what, double value, double limit);
+  /// A number of it that nothing is asked of.
+  void note(const std::string& what, double value);
+  /// A criterion that does not apply or does not hold, and why.
+  void excuse(const std::string& rungs, const std::string& why);
+
+ private:
+  struct Line {
+    std::string setting, rung, outcome, measured;
+    double seconds = 0.0;
+  };
+  struct Count {
+    int passed = 0, named = 0;
+    double seconds = 0.0;
+  };
+  std::string row_, asks_;
+  std::vector<Line> lines_;
+  std::map<std::string, Count> counts_;
+  std::vector<std::pair<std::string, std::string>> excuses_;
+};
 
 }  // namespace sinew::tests
