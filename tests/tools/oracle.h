@@ -9,7 +9,6 @@
 #include "tools/character.h"
 
 /// The skin of bundled samples on any rung of the ladder, held in a pose or moving.
-/// by.
 namespace sinew::tests {
 
 /// Skins of one run, one per frame; empty where there is no answer.
