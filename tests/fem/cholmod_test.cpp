@@ -8,6 +8,7 @@
 #include <Eigen/SparseCore>
 #include <cholmod.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -179,6 +180,8 @@ int num_threads_of_process() {
 }
 
 TEST(Factor, StartsNoThreadsOfItsOwn) {
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism,
+                                1);  // large solves share theirs
   const int before = num_threads_of_process();
   ASSERT_GT(before, 0);
   solve_ones(grid_matrix(20));  // supernodes of several hundred rows, where CHOLMOD's loops become parallel
