@@ -123,7 +123,7 @@ std::vector<std::string> outside_envelope(const Body& body, const Motion& motion
   warn(turn, kTestedTurn * (1.0 + 1e-9), fmt::format("turns by {:.3g} degrees", turn.value));
   warn(jump, kTestedJump * (1.0 + 1e-9),
        fmt::format("jumps by {:.3g} sizes of the body, so the flesh is carried along,", jump.value));
-  warn(jolt, kTestedJolt * sound,
+  warn(jolt, (options.model == "stvk" ? kTestedJoltOfStvk : kTestedJolt) * sound,
        fmt::format("changes its velocity by {:.3g} m/s ({:.3g} times sound in the flesh)", jolt.value,
                    jolt.value / sound));
   warn(stretch, kTestedStretch * (1.0 + 1e-9),

@@ -36,7 +36,8 @@ inline constexpr double kTestedStretch = 10.0;       ///< length of a bone over 
 inline constexpr double kTestedSqueeze = 0.1;        ///< the same, at the least.
 inline constexpr double kTestedSqueezeOfStvk = 0.8;  ///< which buckles first and then gives up.
 /// Change of a bone's velocity, in speeds of sound of the softest flesh, sqrt(E / rho) [-].
-inline constexpr double kTestedJolt = 0.5;
+inline constexpr double kTestedJolt = 1.0;
+inline constexpr double kTestedJoltOfStvk = 0.5;  ///< which the speed of sound squeezes beyond its law.
 
 /// Weight of the softest flesh over its stiffness, rho g size / E [-]: of a heavier body linear flesh may sag
 /// by a hundred of its lengths, and StVK's is squeezed below the least stretch of its law long before.

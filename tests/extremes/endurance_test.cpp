@@ -67,7 +67,8 @@ TEST(Extremes, X20AMillionSteps) {
     const Extreme run = run_extreme({body, still_base, options, steps}, look, false);
     table.add(fmt::format("{} steps at rest", steps), rung, run);
     table.at_most("drift", distance(run.x, body.mesh.points), 1e-9);
-    table.at_most("memory grown", resident() / before - 1.0, 0.01);
+    // Of a hundred steps it shows what the first of them have touched.
+    if (kNightly) table.at_most("memory grown", resident() / before - 1.0, 0.01);
     const Motion waving = [](double time) -> std::vector<Eigen::Affine3d> {
       return {turned(40.0 * std::sin(3.0 * time))};
     };
