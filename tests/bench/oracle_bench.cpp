@@ -32,7 +32,7 @@ Frames held_box(const std::string& rung, double degrees) {
 }
 
 std::string distance(const Frames& a, const Frames& b, double length) {
-  return a.empty() || b.empty() ? "no rest" : fmt::format("{:.2f}", tests::rms_percent(a, b, length));
+  return a.empty() || b.empty() ? "none" : fmt::format("{:.2f}", tests::rms_percent(a, b, length));
 }
 
 template <class Run>

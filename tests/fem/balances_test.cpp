@@ -65,7 +65,7 @@ Momenta momenta(const Body& body, const State& state) {
 }
 
 // Inner forces have no resultant in any law, and every integrator is exact for a constant force: p grows by m
-// g t. Rounding of 30 steps and what PCG and Newton leave of the forces: measured 2e-9 (corotational).
+// g t. Rounding of 30 steps and what PCG and Newton leave of the forces: measured 8e-9 (corotational).
 TEST(Momentum, OfAFreeBodyGrowsByItsWeightAlone) {
   const Body body = block(2e4, false);
   tests::Range errors;
@@ -83,7 +83,7 @@ TEST(Momentum, OfAFreeBodyGrowsByItsWeightAlone) {
       const Eigen::RowVector3d expected = before.linear + weight * options.gravity.transpose();
       const double error = (momenta(body, simulation.state()).linear - expected).norm() / expected.norm();
       errors.add(error);
-      EXPECT_LE(error, 1e-8) << info.name << " " << static_cast<int>(integrator);
+      EXPECT_LE(error, 3e-8) << info.name << " " << static_cast<int>(integrator);
     }
   }
   tests::publish("momentum", "%.0e", errors.high());
