@@ -12,7 +12,8 @@ namespace {
 constexpr std::array<char, 3> kAxis{'x', 'y', 'z'};
 
 std::string quoted(const std::string& kind, const std::string& name, std::size_t index) {
-  return kind + " " + (name.empty() ? std::to_string(index) : "'" + printable(name) + "'");
+  if (name.empty()) return kind + " " + std::to_string(index);
+  return std::string(kind).append(" '").append(printable(name)).append("'");
 }
 
 bool in_range(int index, std::size_t size) { return index >= 0 && static_cast<std::size_t>(index) < size; }
