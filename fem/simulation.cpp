@@ -282,9 +282,9 @@ SolveReport Simulation::midpoint_step(double h, const PosedFrames& next, State& 
   // what the prediction of x_n+1 lacks, which is taken at the middle. Flesh that only moves with its frames
   // has none.
   const Points to_next = carried(body_, state_.x, now_, next);
-  const Points since = has_before_ && last_h_ == h ? carried(body_, state_.x, now_, past_) : state_.x;
-  const double span = has_before_ && last_h_ == h ? 2.0 * h : h;
-  Points end = to_next + h * (state_.v - (to_next - since) / span);
+  const bool centred = has_before_ && last_h_ == h;  // the frames' velocity at the begin, else after it
+  const Points since = centred ? carried(body_, state_.x, now_, past_) : state_.x;
+  Points end = to_next + h * (state_.v - (to_next - since) / (centred ? 2.0 * h : h));
   place_bones(body_, next, end);
   fill_inactive_leaves(body_, end);
   const Points half_way = 0.5 * (state_.x + end);

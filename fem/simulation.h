@@ -49,7 +49,8 @@ struct SimulationReport {
 };
 
 /// A frame that moves farther than this between two steps, in sizes of the body [-], was not moved but cut:
-/// nobody means the flesh to be dragged over a hundred of its lengths in a second.
+/// at the default step nobody means the flesh to be dragged over a hundred of its lengths in a second. Longer
+/// steps reach it at lower speeds; the envelope warns of it.
 inline constexpr double kCutJump = 1.0;
 
 class Simulation {
@@ -64,10 +65,10 @@ class Simulation {
   [[nodiscard]] SimulationReport settle();
 
   /// Steps, or sub-steps where a frame turns fast or the model's solve fails, until state().time >= time;
-  /// where a frame jumps by more than kCutJump the flesh is carried along with the frames, its velocity kept:
-  /// a cut gives it no push.
-  /// does nothing when it is there already. Throws std::invalid_argument naming joint and time where the
-  /// motion gives a frame that is not finite or has no volume; the state stays the last good one.
+  /// does nothing when it is there already. Where a frame jumps by more than kCutJump the flesh is carried
+  /// along with the frames and keeps its velocity: a cut gives it no push. Throws std::invalid_argument
+  /// naming joint and time where the motion gives a frame that is not finite or has no volume; the state
+  /// stays the last good one.
   [[nodiscard]] SimulationReport advance_to(double time);
 
   /// Gives the flesh a velocity [m/s], num_vertices x 3, before the first step; bone vertices keep the
