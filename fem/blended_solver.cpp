@@ -15,6 +15,7 @@
 #include "fem/detail/couples.h"
 #include "fem/detail/region_systems.h"
 #include "fem/growth.h"
+#include "fem/placement.h"
 
 namespace sinew::fem {
 namespace {
@@ -136,8 +137,8 @@ struct BlendedSolver::Impl::StepData {
   Stage stage;
   double h, alpha, beta;
   Eigen::Vector3d gravity;
-  Points x_h, v_h, x_known, v_known;  ///< coefficients.
-  Rest rest;                          ///< at the stage.
+  Points x_h, v_h, x_expected, v_expected;  ///< coefficients.
+  Rest rest;                                ///< at the stage.
   struct Past {
     double share;
     const PosedFrames* pose;
@@ -175,12 +176,11 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
   std::vector<Inputs>& coefficients = s.values_are_coefficients ? s.inputs : s.coefficients;
   for (std::size_t k = 0; k < s.functions.size(); ++k) {
     const int f = s.functions[k];
-    const bool known = static_cast<int>(k) >= s.num_unknown;
     // A detail is a difference of positions: it turns with the region but does not travel.
     const double is_value = coordinates.is_value[static_cast<std::size_t>(f)] ? 1.0 : 0.0;
     const auto rest_of = [&](const Rest& rest) { return rest.of(*body, coordinates, region, f); };
-    const Eigen::Vector3d x_stage = (known ? step.x_known : step.x_h).row(f).transpose();
-    const Eigen::Vector3d p = to_local * (x_stage - is_value * end.origin);
+    const Eigen::Vector3d x_expected = step.x_expected.row(f).transpose();
+    const Eigen::Vector3d p = to_local * (x_expected - is_value * end.origin);
     const Eigen::Vector3d u_end = p - rest_of(step.rest);
     Eigen::Vector3d u_past = Eigen::Vector3d::Zero(), carried = Eigen::Vector3d::Zero();
     for (std::size_t j = 0; j < step.past.size(); ++j) {
@@ -193,8 +193,8 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
     // step.
     const Eigen::Vector3d x_h = step.x_h.row(f).transpose();
     const Eigen::Vector3d v_frame = (carried - x_h) / (step.stage.kappa * step.h);
-    Eigen::Vector3d inertia = step.v_h.row(f).transpose() + (th * step.alpha) * v_frame;
-    if (known) inertia -= (1.0 + th * step.alpha) * step.v_known.row(f).transpose();
+    const Eigen::Vector3d inertia = step.v_h.row(f).transpose() + (th * step.alpha) * v_frame -
+                                    (1.0 + th * step.alpha) * step.v_expected.row(f).transpose();
     coefficients[k] = {lanes(to_local * inertia), lanes(-th * ((1.0 + b) * u_end - b * u_past)),
                        lanes(-th * p)};
   }
@@ -249,10 +249,10 @@ void BlendedSolver::Impl::solve_region(RegionSystem& s, const StepData& step, co
 
   // Velocity of every local function in rotated axes, then at the region's vertices, back in the world,
   // weighted.
-  s.velocity.topRows(s.num_unknown) = Eigen::Map<const Points>(s.solution.data(), s.num_unknown, 3);
-  for (std::size_t k = static_cast<std::size_t>(s.num_unknown); k < s.functions.size(); ++k) {
-    s.velocity.row(static_cast<Eigen::Index>(k)) = step.v_known.row(s.functions[k]) * end.rotation;
+  for (std::size_t k = 0; k < s.functions.size(); ++k) {
+    s.velocity.row(static_cast<Eigen::Index>(k)) = step.v_expected.row(s.functions[k]) * end.rotation;
   }
+  s.velocity.topRows(s.num_unknown) += Eigen::Map<const Points>(s.solution.data(), s.num_unknown, 3);
   for (std::size_t k = 0; k < s.blended.size(); ++k) {
     Eigen::RowVector3d y = Eigen::RowVector3d::Zero();
     if (s.blended[k] >= 0) {
@@ -266,37 +266,36 @@ void BlendedSolver::Impl::solve_region(RegionSystem& s, const StepData& step, co
 namespace {
 
 /// v* of all leaf vertices: exact on bones; elsewhere skinned position plus velocity relative to the frames.
-Points known_velocity(const Body& body, const State& state, const Points& x_h, const StagePoses& poses,
-                      double elapsed, double eta_h, bool need_neighbours) {
+/// What it lacks is what a region solves for: little, so a rounded factor does, and nothing at rest.
+Points expected_velocity(const Body& body, const State& state, const Points& x_h, const StagePoses& poses,
+                         double elapsed, double eta_h) {
   Points v = Points::Zero(body.mesh.num_vertices(), 3);
-  if (need_neighbours) {
-    const auto num_frames = body.tree.frames.size();
-    const double past_h = poses.before != nullptr ? poses.now->time - poses.before->time : 0.0;
-    std::vector<Eigen::Affine3d> forward(num_frames), backward(num_frames);
-    std::vector<Eigen::Matrix3d> turn(num_frames);
-    for (std::size_t f = 0; f < num_frames; ++f) {
-      const FrameTransform& now = poses.now->frames[f];
-      forward[f] = poses.stage->frames[f].from_rest * now.to_rest;
-      turn[f] = poses.stage->frames[f].rotation * now.rotation.transpose();
-      if (poses.before != nullptr) backward[f] = poses.before->frames[f].from_rest * now.to_rest;
-    }
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, body.mesh.num_vertices(), 256), [&](const tbb::blocked_range<int>& range) {
-          for (int a = range.begin(); a != range.end(); ++a) {
-            const Eigen::Vector3d x = state.x.row(a).transpose();
-            Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-            for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
-              const auto f = static_cast<std::size_t>(it.col());
-              Eigen::Vector3d velocity = (forward[f] * x - x) / elapsed;
-              if (poses.before != nullptr) {
-                velocity += turn[f] * (state.v.row(a).transpose() - (x - backward[f] * x) / past_h);
-              }
-              sum += it.value() * velocity;
-            }
-            v.row(a) = sum.transpose();
-          }
-        });
+  const auto num_frames = body.tree.frames.size();
+  const double past_h = poses.before != nullptr ? poses.now->time - poses.before->time : 0.0;
+  std::vector<Eigen::Affine3d> forward(num_frames), backward(num_frames);
+  std::vector<Eigen::Matrix3d> turn(num_frames);
+  for (std::size_t f = 0; f < num_frames; ++f) {
+    const FrameTransform& now = poses.now->frames[f];
+    forward[f] = poses.stage->frames[f].from_rest * now.to_rest;
+    turn[f] = poses.stage->frames[f].rotation * now.rotation.transpose();
+    if (poses.before != nullptr) backward[f] = poses.before->frames[f].from_rest * now.to_rest;
   }
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, body.mesh.num_vertices(), 256), [&](const tbb::blocked_range<int>& range) {
+        for (int a = range.begin(); a != range.end(); ++a) {
+          const Eigen::Vector3d x = state.x.row(a).transpose();
+          Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+          for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+            const auto f = static_cast<std::size_t>(it.col());
+            Eigen::Vector3d velocity = (forward[f] * x - x) / elapsed;
+            if (poses.before != nullptr) {
+              velocity += turn[f] * (state.v.row(a).transpose() - (x - backward[f] * x) / past_h);
+            }
+            sum += it.value() * velocity;
+          }
+          v.row(a) = sum.transpose();
+        }
+      });
   for (const BoneVertex& bone : body.bones.vertices) {
     v.row(bone.vertex) =
         (bone_position(bone, poses.stage->joints).transpose() - x_h.row(bone.vertex)) / eta_h;
@@ -318,14 +317,14 @@ lattice::Points BlendedSolver::stage_velocity(const StageProblem& problem) {
   step.beta = body.damping.beta();
   step.gravity = problem.gravity;
   const double eta_h = step.stage.eta * h;
-  const Points v_known = known_velocity(body, *problem.state, x_h, problem.poses, problem.elapsed, eta_h,
-                                        impl_->systems.size() > 1);
-  const Points x_known = x_h + eta_h * v_known;
+  const Points v_expected =
+      expected_velocity(body, *problem.state, x_h, problem.poses, problem.elapsed, eta_h);
+  const Points x_expected = x_h + eta_h * v_expected;
   const Coordinates& coordinates = impl_->coordinates;
   coordinates.analyse(x_h, step.x_h);
   coordinates.analyse(*problem.v_h, step.v_h);
-  coordinates.analyse(x_known, step.x_known);
-  coordinates.analyse(v_known, step.v_known);
+  coordinates.analyse(x_expected, step.x_expected);
+  coordinates.analyse(v_expected, step.v_expected);
   step.rest = Rest(body, coordinates, *problem.poses.stage);
   assert(problem.past.size() <= kMostPast && "no integrator looks further back");
   for (const PastPlace& place : problem.past) {
@@ -352,18 +351,8 @@ lattice::Points BlendedSolver::stage_velocity(const StageProblem& problem) {
       v.row(s.region->vertices[k]) += s.result.row(static_cast<Eigen::Index>(k));
     }
   }
-  for (const BoneVertex& bone : body.bones.vertices) v.row(bone.vertex) = v_known.row(bone.vertex);
-  // Inactive vertices follow their parents: only the active functions are unknowns.
-  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
-    const int vertex = body.mesh.vertices[static_cast<std::size_t>(a)];
-    if (body.hierarchy.level(vertex) == 0 || impl_->body->bones.is_bone[static_cast<std::size_t>(a)])
-      continue;
-    if (std::binary_search(body.mesh.functions.begin(), body.mesh.functions.end(), vertex)) continue;
-    Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
-    const auto parents = body.hierarchy.parents(vertex);
-    for (int p : parents) mean += v.row(body.mesh.leaf_of_vertex[static_cast<std::size_t>(p)]);
-    v.row(a) = mean / static_cast<double>(parents.size());
-  }
+  for (const BoneVertex& bone : body.bones.vertices) v.row(bone.vertex) = v_expected.row(bone.vertex);
+  fill_inactive_leaves(body, v);
   return v;
 }
 

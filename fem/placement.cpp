@@ -56,9 +56,10 @@ void place_bones(const Body& body, const PosedFrames& posed, Points& x) {
 }
 
 void fill_inactive_leaves(const Body& body, Points& x) {
+  if (body.mesh.num_functions() == body.mesh.num_vertices()) return;
   for (int a = 0; a < body.mesh.num_vertices(); ++a) {
     const int vertex = body.mesh.vertices[static_cast<std::size_t>(a)];
-    if (body.hierarchy.level(vertex) == 0) continue;
+    if (body.hierarchy.level(vertex) == 0 || body.bones.is_bone[static_cast<std::size_t>(a)]) continue;
     if (std::binary_search(body.mesh.functions.begin(), body.mesh.functions.end(), vertex)) continue;
     Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
     const auto parents = body.hierarchy.parents(vertex);

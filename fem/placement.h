@@ -24,8 +24,8 @@ lattice::Points turned(const Body& body, const lattice::Points& v, const PosedFr
 /// Puts bone vertices exactly on the clip.
 void place_bones(const Body& body, const PosedFrames& posed, lattice::Points& x);
 
-/// Inactive vertices at the mean of their parents, coarse to fine, so that `values` lies in the space of the
-/// active functions.
+/// Inactive vertices, but those on bones, at the mean of their parents, coarse to fine, so that `values` lies
+/// in the space of the active functions.
 void fill_inactive_leaves(const Body& body, lattice::Points& values);
 
 }  // namespace sinew::fem
