@@ -9,9 +9,10 @@
 
 namespace sinew::fem {
 
-/// Precision in which a factor is kept. Solves are bound by reading it, so float takes about half the time,
-/// with a relative error near 3e-7 (the matrix is scaled to unit diagonal first).
-enum class Precision { Double, Float };
+/// Precision in which a factor is kept; the matrix is scaled to unit diagonal first. Solves of large factors
+/// are bound by reading it: float takes half of double's time, with a relative error near 3e-7, and Short, of
+/// sixteen bits, half of float's, with one near 1e-4.
+enum class Precision { Double, Float, Short };
 
 /// Sparse Cholesky factor of a symmetric positive definite matrix: factored once by CHOLMOD (supernodal,
 /// METIS), packed into our own dense panels and solved with them, so that one factor can be read by any

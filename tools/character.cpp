@@ -374,8 +374,7 @@ fem::SimulationOptions simulation_options(const Scene& scene) {
   options.step = scene.step;
   options.integrator = scene.integrator;
   options.model = scene.model;
-  options.solver.precision =
-      scene.precision == Precision::Double ? fem::Precision::Double : fem::Precision::Float;
+  options.solver.precision = scene.precision;
   // On uniform levels the hats of the finest level span the same space as the hierarchical basis with fewer
   // couplings: a step takes a sixth less. Local refinement will need the hierarchical one.
   options.solver.basis = fem::Basis::Nodal;

@@ -13,9 +13,7 @@
 namespace sinew::tools {
 
 using fem::Integrator;
-
-/// Numbers in which factors are kept for solving; everything else is double.
-enum class Precision { Double, Float };
+using fem::Precision;
 
 /// Units and axes of what is written: the input file's own, or metres with Y up.
 enum class OutputSpace { File, Si };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <cstring>
 
 /// Fixed-width vectors for the two inner loops of a step. The width is part of the result (sums are taken
@@ -34,6 +35,17 @@ SINEW_INLINE void load(const void* from, Vector& to) {
 template <class Vector>
 SINEW_INLINE void store(const Vector& from, void* to) {
   std::memcpy(to, &from, sizeof(Vector));
+}
+
+/// Eight words that hold two numbers of sixteen bits each: the words themselves, and their lower halves
+/// shifted up. Both in units of 2^-16, so that no bit has to be masked.
+SINEW_INLINE void load_pairs(const std::uint32_t* from, Float8& upper, Float8& lower) {
+  using Unsigned8 = std::uint32_t __attribute__((vector_size(32)));
+  using Signed8 = std::int32_t __attribute__((vector_size(32)));
+  Unsigned8 words;
+  std::memcpy(&words, from, sizeof(words));
+  upper = __builtin_convertvector(reinterpret_cast<Signed8>(words), Float8);
+  lower = __builtin_convertvector(reinterpret_cast<Signed8>(words << 16), Float8);
 }
 
 /// Which of two compilations of the same loop runs; the bits are the same.

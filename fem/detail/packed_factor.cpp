@@ -33,35 +33,45 @@ std::vector<Supernode> supernodes_of(const cholmod_factor& factor, std::span<con
 
 PackedFactor::PackedFactor(const cholmod_factor& factor, Eigen::VectorXd scale, Precision precision,
                            std::span<const std::uint8_t> wanted)
-    : scale_(std::move(scale)), precision_(precision) {
+    : scale_(std::move(scale)) {
   const int* permutation = static_cast<const int*>(factor.Perm);
   permutation_.assign(permutation, permutation + factor.n);
   const std::vector<Supernode> supernodes = supernodes_of(factor, wanted);
-  if (precision == Precision::Double) {
-    panels_ = Panels<double>(size(), supernodes);
-  } else {
-    float_panels_ = Panels<float>(size(), supernodes);
-  }
+  if (precision == Precision::Double) panels_.emplace<Panels<double>>(size(), supernodes);
+  if (precision == Precision::Float) panels_.emplace<Panels<float>>(size(), supernodes);
+  if (precision == Precision::Short) panels_.emplace<Panels<Pair>>(size(), supernodes);
 }
 
 void PackedFactor::solve(Eigen::Ref<Eigen::VectorXd> b, Eigen::VectorXd& workspace) const {
   const auto row = [&](Eigen::Index i) { return permutation_[static_cast<std::size_t>(i)]; };
   const auto n = scale_.size();
-  if (precision_ == Precision::Double) {
-    if (workspace.size() < n + panels_.work_size()) workspace.resize(n + panels_.work_size());
+  if (const auto* panels = std::get_if<Panels<double>>(&panels_)) {
+    if (workspace.size() < n + panels->work_size()) workspace.resize(n + panels->work_size());
     for (Eigen::Index i = 0; i < n; ++i) workspace[i] = scale_[row(i)] * b[row(i)];
-    panels_.solve(workspace.data(), workspace.data() + n);
+    panels->solve(workspace.data(), workspace.data() + n);
     for (Eigen::Index i = 0; i < n; ++i) b[row(i)] = scale_[row(i)] * workspace[i];
     return;
   }
-  Eigen::VectorXf x(n + float_panels_.work_size());
   // Norm one: a small right-hand side must not fall among float's denormals.
   double norm = 0.0;
   for (Eigen::Index i = 0; i < n; ++i) norm = std::max(norm, std::abs(scale_[i] * b[i]));
   if (norm == 0.0) return b.setZero(), void();
-  for (Eigen::Index i = 0; i < n; ++i) x[i] = static_cast<float>(scale_[row(i)] * b[row(i)] / norm);
-  float_panels_.solve(x.data(), x.data() + n);
-  for (Eigen::Index i = 0; i < n; ++i) b[row(i)] = scale_[row(i)] * norm * static_cast<double>(x[i]);
+  const auto in_float = [&](const auto& panels) {
+    Eigen::VectorXf x(n + panels.work_size());
+    for (Eigen::Index i = 0; i < n; ++i) x[i] = static_cast<float>(scale_[row(i)] * b[row(i)] / norm);
+    panels.solve(x.data(), x.data() + n);
+    for (Eigen::Index i = 0; i < n; ++i) b[row(i)] = scale_[row(i)] * norm * static_cast<double>(x[i]);
+  };
+  if (const auto* panels = std::get_if<Panels<float>>(&panels_)) in_float(*panels);
+  if (const auto* panels = std::get_if<Panels<Pair>>(&panels_)) in_float(*panels);
+}
+
+std::size_t PackedFactor::num_values() const {
+  return std::visit([](const auto& panels) { return panels.num_values(); }, panels_);
+}
+
+std::size_t PackedFactor::num_values_read() const {
+  return std::visit([](const auto& panels) { return panels.num_values_read(); }, panels_);
 }
 
 Eigen::VectorXd jacobi_scale(const Eigen::VectorXd& diagonal) { return diagonal.cwiseSqrt().cwiseInverse(); }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
@@ -25,15 +26,13 @@ class PackedFactor {
   void solve(Eigen::Ref<Eigen::VectorXd> b, Eigen::VectorXd& workspace) const;
 
   int size() const { return static_cast<int>(scale_.size()); }
-  std::size_t num_values() const { return panels_.num_values() + float_panels_.num_values(); }
-  std::size_t num_values_read() const { return panels_.num_values_read() + float_panels_.num_values_read(); }
+  std::size_t num_values() const;
+  std::size_t num_values_read() const;
 
  private:
   Eigen::VectorXd scale_;
   std::vector<int> permutation_;  ///< row of A at position i of the factor.
-  Precision precision_ = Precision::Double;
-  Panels<double> panels_;
-  Panels<float> float_panels_;
+  std::variant<Panels<double>, Panels<float>, Panels<Pair>> panels_;
 };
 
 /// 1 / sqrt(diagonal): Jacobi scaling, so a nearly empty cell cannot spoil a float.

@@ -1,9 +1,12 @@
 #include "fem/detail/panels.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include <tbb/parallel_for.h>
 
@@ -16,80 +19,143 @@ constexpr int kBlock = 6;
 
 // A block of w columns, whose first is column j of its panel:
 //
-//     [1/d          ]   its triangle by rows, with the reciprocals of the diagonal,
-//     [ l  1/d      ]
-//     [ l   l   1/d ]
-//     [  rows below ]   then the rows below in groups of kCount lanes: w vectors per group, zeros at the end.
+//     [ inverse of ]   of its triangle, by rows: a product waits for nothing, where a substitution would wait
+//     [ triangle   ]   six times for the entry before; then, of pairs, what a unit is worth in every column,
+//     [ rows below ]   in groups of kLanes rows: a vector per column or pair of columns, zeros at the end.
+
+template <class Stored>
+using ScalarOf = typename ComputedIn<Stored>::Type;
+template <class Stored>
+using Lanes = typename LanesOf<ScalarOf<Stored>>::Type;
+template <class Stored>
+constexpr int kLanes = LanesOf<ScalarOf<Stored>>::kCount;
+template <class Stored>
+constexpr bool kPairs = std::is_same_v<Stored, Pair>;
 
 constexpr int triangle_size(int width) { return width * (width + 1) / 2; }
 
-template <class Scalar>
-constexpr int groups_below(int width, int height) {
-  constexpr int kLanes = LanesOf<Scalar>::kCount;
-  return (height - width + kLanes - 1) / kLanes;
+template <class Stored>
+constexpr int head_size(int width) {
+  return triangle_size(width) + (kPairs<Stored> ? width : 0);
 }
 
-template <class Scalar>
+template <class Stored>
+constexpr int group_size(int width) {
+  return (kPairs<Stored> ? (width + 1) / 2 : width) * kLanes<Stored>;
+}
+
+template <class Stored>
+constexpr int groups_below(int width, int height) {
+  return (height - width + kLanes<Stored> - 1) / kLanes<Stored>;
+}
+
+template <class Stored>
 constexpr std::size_t block_size(int width, int height) {
-  return static_cast<std::size_t>(triangle_size(width) +
-                                  groups_below<Scalar>(width, height) * width * LanesOf<Scalar>::kCount);
+  return static_cast<std::size_t>(head_size<Stored>(width) +
+                                  groups_below<Stored>(width, height) * group_size<Stored>(width));
+}
+
+/// What stands before a block's rows below.
+template <int W, class Stored>
+struct Head {
+  const Stored* triangle;
+  SINEW_INLINE explicit Head(const Stored* values) : triangle(values) {}
+  SINEW_INLINE Stored worth(int) const { return Stored(1); }
+};
+template <int W>
+struct Head<W, Pair> {
+  float triangle[head_size<Pair>(W)];
+  SINEW_INLINE explicit Head(const Pair* values) { std::memcpy(triangle, values, sizeof(triangle)); }
+  SINEW_INLINE float worth(int column) const { return triangle[triangle_size(W) + column]; }
+};
+
+/// Calls use(column, its entries in a group of rows below) for every column.
+template <int W, class Scalar, class Use>
+SINEW_INLINE void for_columns(const Scalar* group, const Use& use) {
+  for (int a = 0; a < W; ++a) {
+    Lanes<Scalar> l;
+    load(group + a * kLanes<Scalar>, l);
+    use(a, l);
+  }
+}
+template <int W, class Use>
+SINEW_INLINE void for_columns(const Pair* group, const Use& use) {
+  for (int a = 0; a < W; a += 2) {
+    Float8 upper, lower;
+    load_pairs(group + a / 2 * kLanes<Pair>, upper, lower);
+    use(a, upper);
+    if (a + 1 < W) use(a + 1, lower);
+  }
 }
 
 /// t holds the right-hand side of the block's rows: solves for the first W, subtracts them from the rest.
-template <int W, class Scalar>
-SINEW_INLINE void forward_block(const Scalar* values, Scalar* t, int height) {
-  using Lanes = typename LanesOf<Scalar>::Type;
-  constexpr int kLanes = LanesOf<Scalar>::kCount;
-  Lanes y[W] = {};
+template <int W, class Stored>
+SINEW_INLINE void forward_block(const Stored* values, ScalarOf<Stored>* t, int height) {
+  using Scalar = ScalarOf<Stored>;
+  const Head<W, Stored> head(values);
+  Scalar y[W];
+  Lanes<Stored> factors[W];
   for (int a = 0; a < W; ++a) {
-    Scalar sum = t[a];
-    for (int b = 0; b < a; ++b) sum -= values[triangle_size(a) + b] * t[b];
-    t[a] = sum * values[triangle_size(a) + a];
-    y[a] = Lanes{} + t[a];
+    y[a] = Scalar(0);
+    for (int b = 0; b <= a; ++b) y[a] += head.triangle[triangle_size(a) + b] * t[b];
+    factors[a] = Lanes<Stored>{} + head.worth(a) * y[a];
   }
-  const Scalar* below = values + triangle_size(W);
+  std::copy(y, y + W, t);
+  const Stored* group = values + head_size<Stored>(W);
   Scalar* target = t + W;
-  for (int g = groups_below<Scalar>(W, height); g > 0; --g, below += W * kLanes, target += kLanes) {
-    Lanes sum, l;
+  for (int g = groups_below<Stored>(W, height); g > 0; --g) {
+    Lanes<Stored> sum;
     load(target, sum);
-    for (int a = 0; a < W; ++a) {
-      load(below + a * kLanes, l);
-      sum -= l * y[a];
-    }
+    for_columns<W>(group, [&](int a, const Lanes<Stored>& l) { sum -= l * factors[a]; });
     store(sum, target);
+    group += group_size<Stored>(W);
+    target += kLanes<Stored>;
   }
 }
 
 /// t holds the solution in the rows below the block, and y in its own: solves for those.
-template <int W, class Scalar>
-SINEW_INLINE void backward_block(const Scalar* values, Scalar* t, int height) {
-  using Lanes = typename LanesOf<Scalar>::Type;
-  constexpr int kLanes = LanesOf<Scalar>::kCount;
-  Lanes sums[W] = {};
-  const Scalar* below = values + triangle_size(W);
-  const Scalar* source = t + W;
-  for (int g = groups_below<Scalar>(W, height); g > 0; --g, below += W * kLanes, source += kLanes) {
-    Lanes x, l;
-    load(source, x);
-    for (int a = 0; a < W; ++a) {
-      load(below + a * kLanes, l);
-      sums[a] += l * x;
-    }
-  }
-  for (int a = W - 1; a >= 0; --a) {
-    Scalar parts[kLanes];
+template <int W, class Stored>
+SINEW_INLINE void backward_block(const Stored* values, ScalarOf<Stored>* t, int height) {
+  using Scalar = ScalarOf<Stored>;
+  const Head<W, Stored> head(values);
+  Lanes<Stored> sums[W] = {};
+  const Stored* below = values + head_size<Stored>(W);
+  const int groups = groups_below<Stored>(W, height);
+  const std::ptrdiff_t size = head_size<Stored>(W) + std::ptrdiff_t{groups} * group_size<Stored>(W);
+  // Blocks are read in descending order and each of them ascending, which no processor foresees: fetches the
+  // block before while this one is read. It is a group longer at most.
+  const auto fetch = [&](const Stored* from, int count) {
+    constexpr int kLine = 64 / static_cast<int>(sizeof(Stored));
+    for (int i = 0; i < count; i += kLine) __builtin_prefetch(from + i);
+  };
+  fetch(values - size - group_size<Stored>(W), group_size<Stored>(W) + head_size<Stored>(W));
+  const auto add = [&](int g) {
+    Lanes<Stored> x;
+    load(t + W + g * kLanes<Stored>, x);
+    const Stored* group = below + std::ptrdiff_t{g} * group_size<Stored>(W);
+    fetch(group - size, group_size<Stored>(W));
+    for_columns<W>(group, [&](int a, const Lanes<Stored>& l) { sums[a] += l * x; });
+  };
+  // The first group last: it holds what the block before has only just found.
+  for (int g = 1; g < groups; ++g) add(g);
+  if (groups > 0) add(0);
+  Scalar rest[W];
+  for (int a = 0; a < W; ++a) {
+    Scalar parts[kLanes<Stored>];
     store(sums[a], parts);
-    for (int half = kLanes / 2; half > 0; half /= 2) {
+    for (int half = kLanes<Stored> / 2; half > 0; half /= 2) {
       for (int i = 0; i < half; ++i) parts[i] += parts[i + half];
     }
-    Scalar sum = t[a] - parts[0];
-    for (int b = a + 1; b < W; ++b) sum -= values[triangle_size(b) + a] * t[b];
-    t[a] = sum * values[triangle_size(a) + a];
+    rest[a] = t[a] - head.worth(a) * parts[0];
+  }
+  for (int a = 0; a < W; ++a) {
+    t[a] = Scalar(0);
+    for (int b = a; b < W; ++b) t[a] += head.triangle[triangle_size(b) + a] * rest[b];
   }
 }
 
-template <class Scalar>
-SINEW_INLINE void forward_block_of(int width, const Scalar* values, Scalar* t, int height) {
+template <class Stored>
+SINEW_INLINE void forward_block_of(int width, const Stored* values, ScalarOf<Stored>* t, int height) {
   switch (width) {
     case 6:
       return forward_block<6>(values, t, height);
@@ -106,8 +172,8 @@ SINEW_INLINE void forward_block_of(int width, const Scalar* values, Scalar* t, i
   }
 }
 
-template <class Scalar>
-SINEW_INLINE void backward_block_of(int width, const Scalar* values, Scalar* t, int height) {
+template <class Stored>
+SINEW_INLINE void backward_block_of(int width, const Stored* values, ScalarOf<Stored>* t, int height) {
   switch (width) {
     case 6:
       return backward_block<6>(values, t, height);
@@ -127,21 +193,20 @@ SINEW_INLINE void backward_block_of(int width, const Scalar* values, Scalar* t, 
 }  // namespace
 
 /// Sweeps over one panel, compiled once for the processor at hand and once for any.
-template <class Scalar>
-struct Panels<Scalar>::Sweeps {
+template <class Stored>
+struct Panels<Stored>::Sweeps {
   /// Adds to `above` instead of x what belongs to columns from `column_end` on.
   SINEW_INLINE static void forward(const Panels& panels, std::size_t panel, Scalar* x, Scalar* t,
                                    int column_end, Scalar* above) {
-    constexpr int kLanes = LanesOf<Scalar>::kCount;
     const Panel& p = panels.panels_[panel];
     const int* rows = panels.row_index_.data() + p.indices;
     std::copy(x + p.first, x + p.first + p.columns, t);
-    std::fill(t + p.columns, t + p.rows + kLanes, Scalar(0));
-    const Scalar* values = panels.values_.data() + p.values;
+    std::fill(t + p.columns, t + p.rows + kLanes<Stored>, Scalar(0));
+    const Stored* values = panels.values_.data() + p.values;
     for (int j = 0; j < p.columns; j += kBlock) {
       const int width = std::min(kBlock, p.columns - j);
       forward_block_of(width, values, t + j, p.rows - j);
-      values += block_size<Scalar>(width, p.rows - j);
+      values += block_size<Stored>(width, p.rows - j);
     }
     std::copy(t, t + p.columns, x + p.first);
     int i = p.columns;
@@ -149,17 +214,16 @@ struct Panels<Scalar>::Sweeps {
     for (; i < p.rows; ++i) above[panels.top_index_[static_cast<std::size_t>(rows[i - p.columns])]] += t[i];
   }
   SINEW_INLINE static void backward(const Panels& panels, std::size_t panel, Scalar* x, Scalar* t) {
-    constexpr int kLanes = LanesOf<Scalar>::kCount;
     const Panel& p = panels.panels_[panel];
     if (!p.needed) return;
     const int* rows = panels.row_index_.data() + p.indices;
     std::copy(x + p.first, x + p.first + p.columns, t);
     for (int i = p.columns; i < p.rows; ++i) t[i] = x[rows[i - p.columns]];
-    std::fill(t + p.rows, t + p.rows + kLanes, Scalar(0));
-    const Scalar* end = panels.values_.data() + panels.values_end(panel);
+    std::fill(t + p.rows, t + p.rows + kLanes<Stored>, Scalar(0));
+    const Stored* end = panels.values_.data() + panels.values_end(panel);
     for (int j = (p.columns - 1) / kBlock * kBlock; j >= 0; j -= kBlock) {
       const int width = std::min(kBlock, p.columns - j);
-      end -= block_size<Scalar>(width, p.rows - j);
+      end -= block_size<Stored>(width, p.rows - j);
       backward_block_of(width, end, t + j, p.rows - j);
     }
     std::copy(t, t + p.columns, x + p.first);
@@ -203,23 +267,29 @@ struct Panels<Scalar>::Sweeps {
   static void top_any(const Panels& panels, Scalar* x, Scalar* t) { top(panels, x, t); }
 };
 
-template <class Scalar>
-Panels<Scalar>::Panels(int size, const std::vector<Supernode>& supernodes, std::size_t divide_from) {
+template <class Stored>
+Panels<Stored>::Panels(int size, const std::vector<Supernode>& supernodes, std::size_t divide_from) {
   // Parents come later: a needed panel passes the need on to the panel that holds its first row below.
   std::vector<std::uint8_t> needed(static_cast<std::size_t>(size), 0);
-  std::size_t num_values = 0;
+  std::size_t num_stored = 0;
   for (const Supernode& s : supernodes) {
     const auto columns = needed.begin() + s.first;
     const bool need =
         s.wanted || std::any_of(columns, columns + s.columns, [](std::uint8_t n) { return n != 0; });
     if (need && s.rows > s.columns) needed[static_cast<std::size_t>(s.row_indices[s.columns])] = 1;
-    panels_.push_back({s.first, s.columns, s.rows, need, num_values, row_index_.size()});
+    panels_.push_back({s.first, s.columns, s.rows, need, num_stored, row_index_.size()});
     row_index_.insert(row_index_.end(), s.row_indices + s.columns, s.row_indices + s.rows);
-    work_size_ = std::max(work_size_, s.rows + LanesOf<Scalar>::kCount);
-    for (int j = 0; j < s.columns; j += kBlock)
-      num_values += block_size<Scalar>(std::min(kBlock, s.columns - j), s.rows - j);
+    work_size_ = std::max(work_size_, s.rows + kLanes<Stored>);
+    for (int j = 0; j < s.columns; j += kBlock) {
+      const int width = std::min(kBlock, s.columns - j);
+      num_stored += block_size<Stored>(width, s.rows - j);
+      const auto entries = static_cast<std::size_t>(
+          triangle_size(width) + groups_below<Stored>(width, s.rows - j) * kLanes<Stored> * width);
+      num_values_ += entries;
+      if (need) num_needed_values_ += entries;
+    }
   }
-  values_.resize(num_values);
+  values_.resize(num_stored);
   for (std::size_t k = 0; k < supernodes.size(); ++k) pack(supernodes[k], values_.data() + panels_[k].values);
   top_index_.assign(static_cast<std::size_t>(size), -1);
   divide(divide_from);
@@ -227,8 +297,8 @@ Panels<Scalar>::Panels(int size, const std::vector<Supernode>& supernodes, std::
 
 /// Takes the largest subtrees apart until none is more than an eighth of the whole, then deals them out to
 /// parts of about that size. What is left above them is the top.
-template <class Scalar>
-void Panels<Scalar>::divide(std::size_t divide_from) {
+template <class Stored>
+void Panels<Stored>::divide(std::size_t divide_from) {
   const std::size_t n = panels_.size();
   std::vector<std::size_t> first(n), size(n);  // of the subtree under a panel: its first panel, its values
   std::vector<std::vector<std::size_t>> children(n + 1);  // the last: roots
@@ -279,30 +349,57 @@ void Panels<Scalar>::divide(std::size_t divide_from) {
   }
 }
 
-template <class Scalar>
-void Panels<Scalar>::pack(const Supernode& s, Scalar* to) const {
-  constexpr int kLanes = LanesOf<Scalar>::kCount;
+/// One word of a pair; |upper|, |lower| <= 32767 in units of their columns. The upper half is chosen for what
+/// the word is as a whole.
+Pair pair_of(double upper, double lower) {
+  const auto low = static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(lower)));
+  const double high = std::nearbyint(upper - low / 65536.0);
+  return static_cast<Pair>(static_cast<std::int32_t>(high)) << 16 | low;
+}
+
+template <class Stored>
+void Panels<Stored>::pack(const Supernode& s, Stored* to) const {
   const auto entry = [&](int row, int column) {
     return s.values[static_cast<std::size_t>(column) * static_cast<std::size_t>(s.rows) +
                     static_cast<std::size_t>(row)];
   };
   for (int j = 0; j < s.columns; j += kBlock) {
     const int width = std::min(kBlock, s.columns - j);
-    for (int a = 0; a < width; ++a) {
-      for (int b = 0; b < a; ++b) *to++ = static_cast<Scalar>(entry(j + a, j + b));
-      *to++ = static_cast<Scalar>(1.0 / entry(j + a, j + a));
+    Scalar head[head_size<Pair>(kBlock)];
+    double unit[kBlock + 1];
+    for (int b = 0; b < width; ++b) {
+      double inverse[kBlock];
+      inverse[b] = 1.0 / entry(j + b, j + b);
+      for (int a = b + 1; a < width; ++a) {
+        double sum = 0.0;
+        for (int c = b; c < a; ++c) sum += entry(j + a, j + c) * inverse[c];
+        inverse[a] = -sum / entry(j + a, j + a);
+      }
+      for (int a = b; a < width; ++a) head[triangle_size(a) + b] = static_cast<Scalar>(inverse[a]);
+      double largest = std::numeric_limits<double>::min();
+      for (int row = j + width; row < s.rows; ++row) largest = std::max(largest, std::abs(entry(row, j + b)));
+      unit[b] = largest / std::numeric_limits<std::int16_t>::max();
+      if (kPairs<Stored>) head[triangle_size(width) + b] = static_cast<Scalar>(unit[b] / 65536.0);
     }
-    for (int row = j + width; row < s.rows; row += kLanes) {
-      for (int a = 0; a < width; ++a) {
-        for (int i = row; i < row + kLanes; ++i)
-          *to++ = i < s.rows ? static_cast<Scalar>(entry(i, j + a)) : Scalar(0);
+    std::memcpy(to, head, sizeof(Stored) * static_cast<std::size_t>(head_size<Stored>(width)));
+    to += head_size<Stored>(width);
+    for (int row = j + width; row < s.rows; row += kLanes<Stored>) {
+      for (int a = 0; a < width; a += kPairs<Stored> ? 2 : 1) {
+        for (int i = row; i < row + kLanes<Stored>; ++i) {
+          const auto at = [&](int b) { return i < s.rows && b < width ? entry(i, j + b) : 0.0; };
+          if constexpr (kPairs<Stored>) {
+            *to++ = pair_of(at(a) / unit[a], a + 1 < width ? at(a + 1) / unit[a + 1] : 0.0);
+          } else {
+            *to++ = static_cast<Stored>(at(a));
+          }
+        }
       }
     }
   }
 }
 
-template <class Scalar>
-void Panels<Scalar>::solve(Scalar* x, Scalar* work, Code code) const {
+template <class Stored>
+void Panels<Stored>::solve(Scalar* x, Scalar* work, Code code) const {
   const bool wide = code == Code::Wide;
   const auto part_work = [&](std::size_t i) {
     return work + work_size_ + static_cast<std::ptrdiff_t>(i) * part_work_size();
@@ -321,22 +418,15 @@ void Panels<Scalar>::solve(Scalar* x, Scalar* work, Code code) const {
     }
   }
   wide ? Sweeps::top_wide(*this, x, work) : Sweeps::top_any(*this, x, work);
-  tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
+  // From the last on, which the caches may still hold.
+  tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t k) {
+    const std::size_t i = parts_.size() - 1 - k;
     wide ? Sweeps::backward_wide(*this, parts_[i], x, part_work(i))
          : Sweeps::backward_any(*this, parts_[i], x, part_work(i));
   });
 }
 
-template <class Scalar>
-std::size_t Panels<Scalar>::num_values_read() const {
-  std::size_t read = values_.size();
-  for (std::size_t k = 0; k < panels_.size(); ++k) {
-    if (!panels_[k].needed) continue;
-    read += values_end(k) - panels_[k].values;
-  }
-  return read;
-}
-
+template class Panels<Pair>;
 template class Panels<float>;
 template class Panels<double>;
 

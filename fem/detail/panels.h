@@ -17,9 +17,25 @@ struct Supernode {
   bool wanted = true;                ///< the solution in some of its columns is asked for.
 };
 
-template <class Scalar>
+/// Two entries of sixteen bits: shares of the largest that their column of L has below its block, to 1.5e-5.
+using Pair = std::uint32_t;
+
+/// What a solve computes in where panels are kept in `Stored`.
+template <class Stored>
+struct ComputedIn {
+  using Type = Stored;
+};
+template <>
+struct ComputedIn<Pair> {
+  using Type = float;
+};
+
+/// Stored: double, float or Pair.
+template <class Stored>
 class Panels {
  public:
+  using Scalar = typename ComputedIn<Stored>::Type;
+
   Panels() = default;
   /// Copies a factor of `size` rows; supernodes in ascending postorder. Factors of more than `divide_from`
   /// values are divided into subtrees that threads solve side by side.
@@ -33,9 +49,10 @@ class Panels {
   /// Parts of the factor that are solved side by side; 0: the whole of it in one go.
   int num_parts() const { return static_cast<int>(parts_.size()); }
 
-  std::size_t num_values() const { return values_.size(); }
+  /// Entries of the panels, padding included.
+  std::size_t num_values() const { return num_values_; }
   /// Values that a solve reads: all once forward, those of needed panels once backward.
-  std::size_t num_values_read() const;
+  std::size_t num_values_read() const { return num_values_ + num_needed_values_; }
 
  private:
   struct Panel {
@@ -49,7 +66,7 @@ class Panels {
     std::size_t begin = 0, end = 0;
     int column_end = 0;
   };
-  void pack(const Supernode& supernode, Scalar* to) const;
+  void pack(const Supernode& supernode, Stored* to) const;
   std::size_t values_end(std::size_t panel) const {
     return panel + 1 < panels_.size() ? panels_[panel + 1].values : values_.size();
   }
@@ -62,7 +79,8 @@ class Panels {
 
   std::vector<Panel> panels_;
   std::vector<int> row_index_;
-  std::vector<Scalar> values_;
+  std::vector<Stored> values_;
+  std::size_t num_values_ = 0, num_needed_values_ = 0;
   int work_size_ = 0;
   std::vector<std::vector<Subtree>> parts_;
   std::vector<std::size_t> top_;  ///< panels above all subtrees, ascending.
@@ -70,6 +88,7 @@ class Panels {
   int num_top_columns_ = 0;
 };
 
+extern template class Panels<Pair>;
 extern template class Panels<float>;
 extern template class Panels<double>;
 

@@ -1,8 +1,9 @@
 // What a frame and a step cost, as two Markdown tables.
 // First: `corotational` on the bar of swinging_bar.h by several integrators and steps, in processor time on
 // one thread, with the error in time beside it. Second: steps on larger lattices, of one region and of
-// several, factors in double and in float, on one thread and on two, in wall-clock time; that the bits do not
-// depend on the threads is checked on the way. Usage: speed_bench [largest number of vertices].
+// several, factors in double, in float and in sixteen bits, on one thread and on two, in wall-clock time;
+// that the bits do not depend on the threads is checked on the way. Usage: speed_bench [largest number of
+// vertices].
 
 #include <algorithm>
 #include <chrono>
@@ -111,6 +112,17 @@ void print_frames() {
   for (const std::string& row : rows) fmt::print("{}\n", row);
 }
 
+const char* name_of(fem::Precision precision) {
+  switch (precision) {
+    case fem::Precision::Float:
+      return "float";
+    case fem::Precision::Short:
+      return "short";
+    default:
+      return "double";
+  }
+}
+
 struct Steps {
   double median_ms = 0.0;    ///< of the fastest run.
   std::vector<Points> skin;  ///< after every step.
@@ -144,8 +156,8 @@ Steps take_steps_once(const fem::Body& body, const fem::Motion& motion, const st
 
 Steps take_steps(const fem::Body& body, const fem::Motion& motion, const std::string& model,
                  fem::Precision precision, int threads, int count) {
-  fmt::print(stderr, "{} vertices: {}, {}, {} threads\n", body.mesh.num_vertices(), model,
-             precision == fem::Precision::Float ? "float" : "double", threads);
+  fmt::print(stderr, "{} vertices: {}, {}, {} threads\n", body.mesh.num_vertices(), model, name_of(precision),
+             threads);
   Steps best = take_steps_once(body, motion, model, precision, threads, count);
   for (int run = 1; run < kRuns; ++run)
     best.median_ms =
@@ -163,29 +175,37 @@ std::vector<std::string> step_column(const fem::Body& body, const fem::Motion& m
     both = tests::short_number(one.median_ms) + " / " + tests::short_number(two.median_ms);
     return one;
   };
-  std::string in_double, in_float, corotational;
+  std::string in_double, in_float, in_short, corotational;
   const Steps exact = timed("blended", Precision::Double, in_double),
-              rounded = timed("blended", Precision::Float, in_float),
+              in_24 = timed("blended", Precision::Float, in_float),
+              in_16 = timed("blended", Precision::Short, in_short),
               turned = timed("corotational", Precision::Double, corotational);
-  double difference = 0.0;
-  for (std::size_t k = 0; k < exact.skin.size(); ++k)
-    difference = std::max(difference, (exact.skin[k] - rounded.skin[k]).rowwise().norm().maxCoeff());
+  const auto off = [&](const Steps& rounded) {
+    double largest = 0.0;
+    for (std::size_t k = 0; k < exact.skin.size(); ++k)
+      largest = std::max(largest, (exact.skin[k] - rounded.skin[k]).rowwise().norm().maxCoeff());
+    return fmt::format("{:.0e}", largest);
+  };
+  const auto share = [&](const Steps& steps) {
+    return fmt::format("{:.2f}", steps.median_ms / turned.median_ms);
+  };
   const std::vector<int>& unknowns = exact.counts.unknowns;
   return {fmt::format("{}", exact.counts.regions),
           fmt::format("{}", 3 * std::accumulate(unknowns.begin(), unknowns.end(), 0)),
           fmt::format("{:.1f} million", 1e-6 * static_cast<double>(exact.counts.factor_nonzeros)),
           in_double,
           in_float,
-          fmt::format("{:.0e}", difference),
+          in_short,
+          off(in_24) + " / " + off(in_16),
           corotational,
-          fmt::format("{:.2f}", exact.median_ms / turned.median_ms)};
+          share(exact) + " / " + share(in_24) + " / " + share(in_16)};
 }
 
 void print_steps(int largest) {
-  std::vector<std::vector<std::string>> columns{{"regions", "unknowns of all regions",
-                                                 "entries of their factors", "`blended`, double",
-                                                 "`blended`, float", "float from double, of the length",
-                                                 "`corotational`", "`blended`, double, over it, 1 thread"}};
+  std::vector<std::vector<std::string>> columns{
+      {"regions", "unknowns of all regions", "entries of their factors", "`blended`, double",
+       "`blended`, float", "`blended`, short", "float / short from double, of the length", "`corotational`",
+       "double / float / short over it, 1 thread"}};
   std::string head = "| ms per step of 1/120 s, 1 / 2 threads |", rule = "|---|";
   const auto add = [&](const char* name, const fem::Body& body, const fem::Motion& motion, int count) {
     if (body.mesh.num_vertices() > largest) return;

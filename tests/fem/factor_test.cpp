@@ -58,6 +58,25 @@ TEST(Factor, InFloatKeepsSixDigitsOfAScaledRightHandSide) {
   }
 }
 
+// The matrix of a stiff step, mass a hundredth of stiffness: sixteen bits are 1.5e-5 of a column.
+TEST(Factor, InShortKeepsThreeDigits) {
+  const Eigen::SparseMatrix<double> a = bar_stiffness();
+  Eigen::SparseMatrix<double> identity(a.rows(), a.cols());
+  identity.setIdentity();
+  const Eigen::SparseMatrix<double> step = a + 0.01 * a.diagonal().maxCoeff() * identity;
+  Factor exact, rounded;
+  ASSERT_TRUE(exact.factorise(step).ok);
+  ASSERT_TRUE(rounded.factorise(step, Precision::Short).ok);
+  for (double size : {1.0, 1e-45, 1e45}) {
+    const Eigen::VectorXd b = size * random_vector(a.rows(), 2);
+    Eigen::VectorXd x = b, y = b, workspace;
+    exact.solve(x, workspace);
+    rounded.solve(y, workspace);
+    EXPECT_LE((x - y).norm(), 1e-3 * x.norm()) << size;
+    EXPECT_GT((x - y).norm(), 1e-6 * x.norm()) << size;
+  }
+}
+
 // Rows scaled by 1e-8 are what nearly empty cells give.
 TEST(Factor, ScalesRowsOfVeryDifferentSize) {
   Eigen::SparseMatrix<double> a = bar_stiffness();
@@ -99,7 +118,7 @@ TEST(Factor, GivesWantedRowsTheBitsOfTheFullSolve) {
   const Eigen::SparseMatrix<double> a = bar_stiffness();
   std::vector<std::uint8_t> wanted(static_cast<std::size_t>(a.rows()), 0);
   for (std::size_t i = 0; i < wanted.size() / 4; ++i) wanted[i] = 1;
-  for (Precision precision : {Precision::Double, Precision::Float}) {
+  for (Precision precision : {Precision::Double, Precision::Float, Precision::Short}) {
     Factor all, some;
     ASSERT_TRUE(all.factorise(a, precision).ok);
     ASSERT_TRUE(some.factorise(a, precision, wanted).ok);
