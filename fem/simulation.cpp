@@ -14,7 +14,7 @@ using lattice::Points;
 namespace {
 
 constexpr int kMostHalvings = 8;          ///< of a step: for fast frames and for solves that fail.
-constexpr int kStepsBetweenChanges = 10;  ///< each change restarts BDF2, and a restart is first order.
+constexpr int kStepsBetweenChanges = 10;  ///< before a longer step: what turned fast may go on to.
 
 /// A model by its name, for members that need one at once.
 const ModelInfo* model_named(const std::string& name) {
@@ -67,6 +67,7 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
         "integrator: implicit-midpoint damps nothing, and corotational turns its cells ahead of the step, "
         "which feeds energy in; hint: tr-bdf2, or --model neo-hookean");
   }
+  longest_ = options_.step;
   now_ = pose_at(start_time);
   past_ = now_;
   state_.time = start_time;
@@ -199,6 +200,17 @@ void Simulation::set_velocity(const Points& velocity) {
   state_.v = before_.v = v;
 }
 
+void Simulation::set_step(double step) {
+  SimulationOptions changed = options_;
+  changed.step = step;
+  changed.validate();
+  options_.step = step;
+  longest_ = std::max(longest_, step);
+  start_ = state_.time;
+  base_step_ = 0;
+  part_ = 0;
+}
+
 int Simulation::halvings_for(double begin, double h) const {
   if (!info_->dynamic) return 0;
   constexpr int kSamples = 4;  // a full turn within one step must not look like standing still
@@ -252,7 +264,8 @@ SolveReport Simulation::stage_without_history(double span, double h, const Posed
       stage(state_, state_.x, state_.v, {before_pose(), &now_, &middle}, scheme.eta * h, h, middle.time), v);
   if (!solve.ok()) return solve;
   after.x = state_.x + span * v;
-  after.v = state_.v + (v - state_.v) * (span / (scheme.theta * h));
+  after.a = (v - state_.v) / (scheme.theta * h);
+  after.v = state_.v + span * after.a;
   place_bones(body_, next, after.x);
   return solve;
 }
@@ -268,9 +281,20 @@ SolveReport Simulation::bdf2_stage(const State& from, const StagePoses& poses, d
   if (!solve.ok()) return solve;
   after.x = x_h + scheme.eta * h * after.v;
   place_bones(body_, *poses.stage, after.x);
-  if (options_.integrator == Integrator::TrBdf2)
-    step_end_ = StepEnd{from.x, (after.v - v_h) / (scheme.theta * h), *poses.now, h};
+  after.a = (after.v - v_h) / (scheme.theta * h);
+  if (options_.integrator == Integrator::TrBdf2) step_end_ = StepEnd{from.x, *poses.now, h};
   return solve;
+}
+
+SolveReport Simulation::bdf2_step(double h, const PosedFrames& next, State& after) {
+  if (state_.has_past() && last_h_ == h) return bdf2_stage(state_, {&past_, &now_, &next}, h, after);
+  // After a change of step the same formula and the same factor, with the place of one such step earlier.
+  std::optional<State> from = track_.looking_back(state_, h);
+  if (!from) return stage_without_history(h, h, next, after);
+  const PosedFrames before = pose_at(state_.time - h);
+  place_bones(body_, before, from->x_past);
+  fill_inactive_leaves(body_, from->x_past);
+  return bdf2_stage(*from, {&before, &now_, &next}, h, after);
 }
 
 SolveReport Simulation::midpoint_step(double h, const PosedFrames& next, State& after) {
@@ -304,7 +328,7 @@ SolveReport Simulation::trapezoidal_stage(double h, const PosedFrames& middle, S
   const Stage scheme = stage_of(Integrator::TrBdf2);
   const double half = 0.5 * kTrBdf2Break * h;
   const Points x_h = state_.x + half * state_.v;
-  const Points v_h = state_.v + half * step_end_->acceleration;
+  const Points v_h = state_.v + half * state_.a;
   StageProblem problem = stage(state_, x_h, v_h, {before_pose(), &now_, &middle}, 2.0 * half, h, middle.time);
   // The rate of strain with which the last step ended, (u - u_h) / (kappa h_last), goes on for half the
   // stage.
@@ -347,6 +371,7 @@ SimulationReport Simulation::step_after_cut(double h, const PosedFrames& next) {
   const PosedFrames now = now_, past = past_;
   const std::optional<StepEnd> step_end = step_end_;
   const bool has_before = has_before_;
+  const Track track = track_;
 
   now_ = next;
   now_.time = now.time;
@@ -356,17 +381,23 @@ SimulationReport Simulation::step_after_cut(double h, const PosedFrames& next) {
   state_.v = turned(body_, state.v, now, now_);
   state_.x_past.resize(0, 3);
   state_.v_past.resize(0, 3);
+  state_.a.resize(0, 3);
   step_end_.reset();
   has_before_ = false;
+  track_.clear();
   held_ = next;
   const SimulationReport report = step_once(h);
   held_.reset();
-  if (report.steps == 1) return report;
+  if (report.steps == 1) {
+    track_.clear();  // the clip's poses within this step are not those that the flesh saw
+    return report;
+  }
   state_ = state;
   now_ = now;
   past_ = past;
   step_end_ = step_end;
   has_before_ = has_before;
+  track_ = track;
   return report;
 }
 
@@ -380,8 +411,7 @@ SimulationReport Simulation::step_once(double h) {
   after.time = state_.time + h;
   switch (options_.integrator) {
     case Integrator::Bdf2:
-      solve = state_.has_past() && last_h_ == h ? bdf2_stage(state_, {&past_, &now_, &next}, h, after)
-                                                : stage_without_history(h, h, next, after);
+      solve = bdf2_step(h, next, after);
       break;
     case Integrator::ImplicitMidpoint:
       solve = midpoint_step(h, next, after);
@@ -398,6 +428,7 @@ SimulationReport Simulation::step_once(double h) {
       break;
   }
   if (!solve.ok()) return failed(solve);
+  if (options_.integrator == Integrator::Bdf2) track_.pass(state_, longest_);
   before_ = state_;
   after.x_past = state_.x;
   after.v_past = state_.v;
@@ -430,6 +461,8 @@ SimulationReport Simulation::advance_to(double time) {
       ++halvings_;
       part_ *= 2;
       steps_since_change_ = 0;
+      // A jolt: the start without history damps it more than a step that looks back across it.
+      track_.clear();
       continue;
     }
     ++total.steps;

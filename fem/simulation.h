@@ -8,6 +8,7 @@
 #include "fem/loads.h"
 #include "fem/measures.h"
 #include "fem/models/model.h"
+#include "fem/track.h"
 
 /// The time loop: settles the flesh, steps it along a motion, and samples it at any time between steps. Knows
 /// no files.
@@ -75,6 +76,12 @@ class Simulation {
   /// clip's.
   void set_velocity(const lattice::Points& velocity);
 
+  /// Steps by `step` [s] from the last state on; > 0, else throws std::invalid_argument. Every integrator
+  /// keeps its order at any ratio to the step before, BDF2 as far as the steps since the start or the last
+  /// cut reach back; beyond that it starts anew, by one step of first order. A step of a length that was not
+  /// taken before makes the models factor anew.
+  void set_step(double step);
+
   const Body& body() const { return body_; }
   const State& state() const { return state_; }
   /// Leaf vertices at a time between the last two states, moved in bone coordinates; bone vertices exactly on
@@ -97,6 +104,7 @@ class Simulation {
   SolveReport stage_without_history(double span, double h, const PosedFrames& next, State& after);
   /// One stage of BDF2 to poses.stage from a state and the one before it.
   SolveReport bdf2_stage(const State& from, const StagePoses& poses, double h, State& after);
+  SolveReport bdf2_step(double h, const PosedFrames& next, State& after);
   SolveReport midpoint_step(double h, const PosedFrames& next, State& after);
   /// The first part of TR-BDF2, to the pose `middle`: the trapezoidal rule, from how the last step ended.
   SolveReport trapezoidal_stage(double h, const PosedFrames& middle, State& after);
@@ -120,9 +128,11 @@ class Simulation {
   PosedFrames now_, past_;   ///< their poses.
   bool has_before_ = false;  ///< past_ is one real step earlier.
   double last_h_ = 0.0;
-  /// Where TR-BDF2 broke its last step, and the acceleration with which it ended.
+  Track track_;           ///< of BDF2.
+  double longest_ = 0.0;  ///< whole step so far [s].
+  /// Where TR-BDF2 broke its last step.
   struct StepEnd {
-    lattice::Points x_middle, acceleration;  ///< num_vertices x 3 [m], [m/s^2].
+    lattice::Points x_middle;  ///< num_vertices x 3 [m].
     PosedFrames middle;
     double h = 0.0;  ///< [s].
   };

@@ -15,6 +15,7 @@ struct State {
   double time = 0.0;               ///< [s].
   lattice::Points x, v;            ///< num_vertices x 3 [m], [m/s].
   lattice::Points x_past, v_past;  ///< one step earlier; empty where there is no usable history.
+  lattice::Points a;               ///< with which the last step ended [m/s^2]; empty before there is one.
   bool has_past() const { return x_past.rows() > 0; }
 };
 

@@ -168,6 +168,33 @@ TEST(Integrators, KeepTheirOrderThroughStartAndRestart) {
   }
 }
 
+/// Steps of 1 and 1/4 of 1 / `rate` s by turns: each is four times the one before or a quarter of it.
+Points run_by_turns(const Body& body, const Motion& motion, Integrator integrator, int rate) {
+  Simulation simulation(body, motion, 0.0, options_of(1.0 / rate, integrator, 0.1 * kGravity));
+  for (int pair = 0; pair < rate / 5 * 4; ++pair) {
+    for (const double part : {1.0, 0.25}) {
+      simulation.set_step(part / rate);
+      EXPECT_EQ(simulation.advance_to(simulation.state().time + 0.5 * part / rate).steps, 1);
+    }
+  }
+  EXPECT_NEAR(simulation.state().time, kTime, 1e-12);
+  return simulation.state().x;
+}
+
+// With a start anew after every change BDF2 is a method of order 0.9 here, and with velocities between two
+// states that come from the places there one of order 1.1.
+TEST(Integrators, KeepTheirOrderWhenEveryStepIsOfAnotherLength) {
+  for (const Damping& damping : dampings()) {
+    const Body body = soft_bar(damping);
+    for (Integrator second : {Integrator::Bdf2, Integrator::TrBdf2}) {
+      std::vector<Points> ends;
+      for (int rate : {240, 480, 960}) ends.push_back(run_by_turns(body, waving_base, second, rate));
+      EXPECT_GT(observed_order({rms(ends[1] - ends[0]), rms(ends[2] - ends[1])}), 1.9)
+          << static_cast<int>(second) << ", damping " << damping.ratio;
+    }
+  }
+}
+
 // The rungs above solve for positions and take damping's history from any number of places. What a stage
 // leaves of its forces, 1e-6 of them, is far below the errors here.
 TEST(Integrators, KeepTheirOrderOnNonlinearRungs) {
