@@ -216,44 +216,6 @@ TEST(Integrators, KeepTheirOrderOnNonlinearRungs) {
   }
 }
 
-// A stiff body that turns freely by phi a step. With x a point's place, backward Euler's force points to the
-// axis at the end of the step, so x+ x v+ = x+ x v:  2 sin(phi+) = sin(phi+ + phi),  tan(phi+) = sin(phi) /
-// (2 - cos(phi)). Of one turn per second 34 % are lost in a second at 1/60 s; the others lose next to
-// nothing.
-TEST(Integrators, LoseWhatTheirClosedFormSaysOfAFreeSpin) {
-  tests::BarOptions bar;
-  bar.clamped = false;
-  bar.material.young = 1e6;
-  const Body body = tests::bar_body(bar);
-  const Eigen::RowVector3d centre(0.5, 0.0, 0.0), axis(0.0, 2.0 * M_PI, 0.0);
-  Points v(body.mesh.num_vertices(), 3);
-  for (Eigen::Index a = 0; a < v.rows(); ++a)
-    v.row(a) = axis.cross(Eigen::RowVector3d(body.mesh.points.row(a) - centre));
-  const auto momentum = [&](const State& state) {
-    const Points p = apply_mass(body.matrices, state.v);
-    double sum = 0.0;
-    for (Eigen::Index a = 0; a < p.rows(); ++a)
-      sum += Eigen::RowVector3d(state.x.row(a) - centre).cross(Eigen::RowVector3d(p.row(a)))[1];
-    return sum;
-  };
-  double phi = 2.0 * M_PI / 60;
-  for (int k = 0; k < 60; ++k) phi = std::atan2(std::sin(phi), 2.0 - std::cos(phi));
-  const double euler = std::sin(phi) / std::sin(2.0 * M_PI / 60);
-  EXPECT_NEAR(euler, 0.66, 0.005);
-  for (const auto& [integrator, left] : {std::pair{Integrator::BackwardEuler, euler},
-                                         {Integrator::Bdf2, 1.0},
-                                         {Integrator::TrBdf2, 1.0},
-                                         {Integrator::ImplicitMidpoint, 1.0}}) {
-    SimulationOptions options = options_of(1.0 / 60, integrator, Eigen::Vector3d::Zero());
-    options.model = integrator == Integrator::ImplicitMidpoint ? "neo-hookean" : "corotational";
-    Simulation simulation(body, still, 0.0, options);
-    simulation.set_velocity(v);
-    const double before = momentum(simulation.state());
-    ASSERT_EQ(simulation.advance_to(1.0).status, SimulationStatus::Ok);
-    EXPECT_NEAR(momentum(simulation.state()) / before, left, 0.02) << static_cast<int>(integrator);
-  }
-}
-
 /// Factor by which an integrator multiplies a free oscillation in one step, with w the frequency times the
 /// step.
 double amplification(Integrator integrator, double w) {

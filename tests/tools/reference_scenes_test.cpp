@@ -77,24 +77,6 @@ TEST_F(ReferenceScenes, TheReleasedBarFollowsTheModalSolutionWithinOnePerCentOfI
   EXPECT_LT(damped, 1.0);
 }
 
-// A free block that turns once a second. Backward Euler at 1/60 s loses a third of the spin in a second, as
-// tan D+ = sin D / (2 - cos D) says of the angle D of a step; BDF2 turns 1.5 % too little
-// (0.097 rad).
-TEST_F(ReferenceScenes, AFreeBlockLosesItsSpinByBackwardEulerAndKeepsItByBdf2) {
-  const Eigen::RowVector3f end(0.2F, 0.0F, 0.0F);
-  const double step = 2.0 * M_PI / 60.0;
-  double turned = std::atan(step), sum = turned;
-  for (int n = 1; n < 60; ++n) sum += turned = std::atan(std::sin(turned) / (2.0 - std::cos(turned)));
-  const auto angle_left = [&](const std::string& integrator, double expected) {
-    const Eigen::Vector3f u = path_of("spin", end, "--overwrite --integrator " + integrator).at(60);
-    const double angle = std::atan2(static_cast<double>(u.y()), 0.2 + static_cast<double>(u.x()));
-    return std::remainder(angle - expected, 2.0 * M_PI);
-  };
-  EXPECT_NEAR(turned / step, 0.66, 0.005);
-  EXPECT_NEAR(angle_left("backward-euler", sum), 0.0, 2e-3 * sum);
-  EXPECT_NEAR(angle_left("bdf2", 2.0 * M_PI), 0.0, 0.11);
-}
-
 /// Displacement of the lattice vertex that rests at `rest`, from a pose.
 class ReferencePoses : public tests::Simulate {
  protected:
