@@ -1,6 +1,7 @@
 #include "tools/ladder.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -17,6 +18,8 @@
 #include "fem/models/model.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
+#include "tools/ladder_cost.h"
+#include "tools/progress.h"
 #include "tools/scene_fields.h"
 #include "tools/simulate_command.h"
 
@@ -55,6 +58,8 @@ std::string step_text(double step) {
 
 int rank(const std::string& rung) { return static_cast<int>(fem::find_model(rung) - fem::models().data()); }
 
+std::string failure_file(const LadderRun& run) { return (fs::path(run.folder) / "failure.txt").string(); }
+
 /// Reads what the run's own report says of its cost.
 void read_costs(LadderRun& run) {
   const std::string file = (fs::path(run.folder) / "report.json").string();
@@ -78,7 +83,8 @@ void read_costs(LadderRun& run) {
   }
 }
 
-LadderRun do_run(const Scene& scene, const std::string& folder, const Talk& talk) {
+/// A run of the grid, as far as its folder holds it.
+LadderRun planned_run(const Scene& scene, const std::string& folder) {
   LadderRun run;
   run.rung = scene.model;
   run.level = scene.levels;
@@ -88,9 +94,12 @@ LadderRun do_run(const Scene& scene, const std::string& folder, const Talk& talk
   run.folder =
       (fs::path(folder) / fmt::format("{}-l{}-s{}-{}", scene.model, scene.levels, step, settings_hash(scene)))
           .string();
-  const std::string failure_file = (fs::path(run.folder) / "failure.txt").string();
-  run.reused = fs::exists(fs::path(run.folder) / "report.json") || fs::exists(failure_file);
-  if (run.reused && fs::exists(failure_file)) run.failure = read_file(failure_file);
+  run.reused = fs::exists(fs::path(run.folder) / "report.json") || fs::exists(failure_file(run));
+  return run;
+}
+
+void do_run(const Scene& scene, LadderRun& run) {
+  if (run.reused && fs::exists(failure_file(run))) run.failure = read_file(failure_file(run));
   if (!run.reused) {
     Scene with_output = scene;
     with_output.output = run.folder;
@@ -100,17 +109,41 @@ LadderRun do_run(const Scene& scene, const std::string& folder, const Talk& talk
       // The same settings fail again: so the ladder keeps this answer as it keeps others.
       run.failure = error.what();
       fs::create_directories(run.folder);
-      assets::write_file(failure_file, run.failure, assets::Overwrite::Replace);
+      assets::write_file(failure_file(run), run.failure, assets::Overwrite::Replace);
     }
   }
-  if (!run.ok()) {
-    talk(fmt::format("{}: failed: {}{}", run.name(), run.failure, run.reused ? " (was there)" : ""));
-    return run;
+  if (run.ok()) read_costs(run);
+}
+
+/// "blended, level 1, 1/120 s: 12 ms per frame".
+std::string outcome(const LadderRun& run) {
+  return fmt::format(
+      "{}: {}{}", run.name(),
+      run.ok() ? fmt::format("{:.3g} ms per frame", 1e3 * run.per_frame) : "failed: " + run.failure,
+      run.reused ? " (was there)" : "");
+}
+
+void do_runs(const Scene& scene, std::vector<LadderRun>& runs, const Talk& talk) {
+  const auto missing =
+      std::count_if(runs.begin(), runs.end(), [](const LadderRun& run) { return !run.reused; });
+  LadderClock clock({});
+  if (missing > 0) {
+    LadderEstimate estimate = estimate_ladder(scene, runs);
+    clock = std::move(estimate.clock);
+    talk(estimate_line(clock, static_cast<std::size_t>(missing), estimate.all_timed));
   }
-  read_costs(run);
-  talk(fmt::format("{}: {:.3g} ms per frame{}", run.name(), 1e3 * run.per_frame,
-                   run.reused ? " (was there)" : ""));
-  return run;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    LadderRun& run = runs[k];
+    stop_if_interrupted(fmt::format("after {} runs of the ladder; the same command goes on", k));
+    const auto start = std::chrono::steady_clock::now();
+    do_run(scene_of_run(scene, run.rung, run.level, run.step), run);
+    std::string line = fmt::format("[{}/{}] {}", k + 1, runs.size(), outcome(run));
+    if (!run.reused) {
+      clock.finish(k, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+      if (clock.left() > 0.0) line += fmt::format("; {} left", duration_text(clock.left()));
+    }
+    talk(line);
+  }
 }
 
 int find_reference(const std::vector<LadderRun>& runs) {
@@ -213,19 +246,13 @@ Ladder run_ladder(const Scene& scene, const LadderGrid& grid, double limit, cons
   settings_hash(scene);  // names a file that cannot be read before anything is written
   const std::string runs = (fs::path(folder) / "runs").string();
   fs::create_directories(runs);
-  const std::size_t total = grid.rungs.size() * grid.levels.size() * grid.steps.size();
   for (const std::string& rung : grid.rungs) {
     for (const int level : grid.levels) {
-      for (const double step : grid.steps) {
-        stop_if_interrupted(
-            fmt::format("after {} runs of the ladder; the same command goes on", ladder.runs.size()));
-        const auto numbered = [&](const std::string& line) {
-          talk(fmt::format("[{}/{}] {}", ladder.runs.size() + 1, total, line));
-        };
-        ladder.runs.push_back(do_run(scene_of_run(scene, rung, level, step), runs, numbered));
-      }
+      for (const double step : grid.steps)
+        ladder.runs.push_back(planned_run(scene_of_run(scene, rung, level, step), runs));
     }
   }
+  do_runs(scene, ladder.runs, talk);
   ladder.reference = find_reference(ladder.runs);
   if (ladder.reference < 0)
     throw NumericalError("no run of the ladder worked; the first: " + ladder.runs.front().failure);

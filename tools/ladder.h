@@ -67,8 +67,9 @@ Scene scene_of_run(const Scene& scene, const std::string& rung, int level, doubl
 /// input files. Throws assets::IoError where one cannot be read.
 std::string settings_hash(const Scene& scene);
 
-/// Runs what `folder`/runs does not hold yet and measures all of it. A run that fails numerically is part of
-/// the answer; other failures are thrown. Throws NumericalError where no run worked.
+/// Runs what `folder`/runs does not hold yet, after it has said how long that will take, and measures all of
+/// it. A run that fails numerically is part of the answer; other failures are thrown. Throws NumericalError
+/// where no run worked.
 Ladder run_ladder(const Scene& scene, const LadderGrid& grid, double limit, const std::string& folder,
                   const Talk& talk);
 

@@ -16,14 +16,14 @@ namespace {
 constexpr std::chrono::milliseconds kTerminalInterval{100};
 constexpr std::chrono::seconds kLogInterval{10};
 
+}  // namespace
+
 std::string duration_text(double seconds) {
   const long whole = std::lround(seconds);
   if (whole < 60) return fmt::format("{} s", whole);
   if (whole < 3600) return fmt::format("{} min {} s", whole / 60, whole % 60);
   return fmt::format("{} h {} min", whole / 3600, whole % 3600 / 60);
 }
-
-}  // namespace
 
 std::string progress_line(const std::string& label, int done, int total, double seconds) {
   const double share = total > 0 ? static_cast<double>(done) / total : 1.0;

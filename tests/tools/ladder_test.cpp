@@ -12,6 +12,7 @@
 #include "assets/figure.h"
 #include "fem/models/model.h"
 #include "tests/tools/simulate_run.h"
+#include "tools/ladder_cost.h"
 #include "tools/ladder_report.h"
 
 namespace sinew::tools {
@@ -62,6 +63,44 @@ TEST(Ladder, HasConvergedOnlyWhereBothNeighboursAreNear) {
   ladder.neighbours[1].rms = 0.021;
   EXPECT_FALSE(ladder.converged());
   EXPECT_THAT(reference_text(ladder), HasSubstr("NOT converged"));
+}
+
+// 0.5 s, 150 steps of 0.01 s and 31 frames of 0.002 s. Eight times the vertices: sixteen times the entries of
+// a factor, 8^(4/3).
+TEST(LadderClock, AddsUpWhatARunTakes) {
+  const RungCost cost{0.5, 0.01, 0.002, 1000.0, true};
+  EXPECT_NEAR(cost.of_run(150.0, 31.0), 0.5 + 1.5 + 0.062, 1e-12);
+  const RungCost finer = cost.scaled_to(8000.0);
+  EXPECT_NEAR(finer.of_run(150.0, 31.0), 8.0 * 0.5 + 16.0 * 1.5 + 8.0 * 0.062, 1e-12);
+  EXPECT_FALSE(finer.timed);
+}
+
+TEST(LadderClock, IsPutRightByTheRunsThatAreOver) {
+  // The third is there already.
+  LadderClock clock({{"skin", 1, 10.0}, {"skin", 2, 100.0}, {"blended", 1, 0.0}, {"blended", 2, 1000.0}});
+  EXPECT_NEAR(clock.left(), 1110.0, 1e-9);
+  EXPECT_EQ(clock.dearest(), "blended, level 2");
+  EXPECT_EQ(
+      estimate_line(clock, 3, true),
+      "about 18 min 30 s for 3 runs, most of it blended, level 2; hint: fewer --frames, --cells, --rungs "
+      "or --levels, or longer --steps");
+  // Three times as long, and so will the other be of its rung; of all 1110 s they are not much.
+  clock.finish(0, 30.0);
+  EXPECT_NEAR(clock.left(), 300.0 + 1000.0 * 1130.0 / 1110.0, 1e-9);
+  clock.finish(1, 80.0);  // together 110 s, as was expected
+  EXPECT_NEAR(clock.left(), 1000.0, 1e-9);
+  clock.finish(3, 5.0);
+  EXPECT_EQ(clock.left(), 0.0);
+  EXPECT_EQ(clock.dearest(), "");
+}
+
+TEST(LadderClock, BelievesARungsOwnRunsMoreThanThoseOfOthers) {
+  LadderClock clock({{"skin", 1, 10.0}, {"blended", 1, 10.0}, {"blended", 2, 100.0}, {"stvk", 1, 1.0}});
+  clock.finish(0, 40.0);
+  clock.finish(1, 5.0);
+  EXPECT_NEAR(clock.left(), 100.0 * 0.5 + 1.0 * 146.0 / 121.0, 1e-9);
+  EXPECT_EQ(estimate_line(clock, 1, false),
+            "about 51 s for 1 run (fine levels scaled from coarser ones), most of it blended, level 2");
 }
 
 TEST(Ladder, EscapesWhatItPutsIntoThePage) {
@@ -134,6 +173,10 @@ TEST_F(LadderCommand, RunsTheGridOnceAndChoosesARunForATolerance) {
   ASSERT_EQ(first.exit_code, 0) << first.text;
   EXPECT_THAT(first.text, HasSubstr("reference: blended, level 2, 1/120 s, the finest run that worked."));
   EXPECT_THAT(first.text, Not(HasSubstr("was there")));
+  EXPECT_THAT(first.text,
+              ContainsRegex("^about [0-9]+ s for 8 runs, most of it blended, level [12]\n\\[1/8\\] "
+                            "skin, level 1, 1/60 s: [0-9.e-]+ ms per frame; [0-9]+ s left\n"));
+  EXPECT_THAT(first.text, ContainsRegex("\\[8/8\\] blended, level 2, 1/120 s: [0-9.]+ ms per frame\n"));
   const auto json = nlohmann::json::parse(tests::read(out("ladder") / "ladder.json"));
   ASSERT_EQ(json["runs"].size(), 8u);
   const auto& reference = json["runs"][json["reference"].get<std::size_t>()];
@@ -166,6 +209,7 @@ TEST_F(LadderCommand, RunsTheGridOnceAndChoosesARunForATolerance) {
   std::size_t reused = 0;
   for (std::size_t at = 0; (at = again.text.find("(was there)", at)) != std::string::npos; ++at) ++reused;
   EXPECT_EQ(reused, 8u);
+  EXPECT_THAT(again.text, Not(HasSubstr("about"))) << "what is there takes no time";
   EXPECT_EQ(nlohmann::json::parse(tests::read(out("ladder") / "ladder.json")), json)
       << "costs are those of the runs";
 
