@@ -87,6 +87,28 @@ TEST(RotationTrack, TurnsAtConstantSpeedAboutTheAxisBetweenItsKeys) {
   }
 }
 
+// Two keys say where a turn ends and not how often it goes round: half-way stands half of what is left of
+// whole turns, the shorter way, and at half a turn the way of the keys' quaternions.
+TEST(RotationTrack, GoesTheShorterWayFromKeyToKey) {
+  for (const double degrees : {1.0, 30.0, 90.0, 179.0, 180.0, 181.0, 270.0, 359.0, 720.0}) {
+    const double turn = degrees * std::numbers::pi / 180.0;
+    RotationTrack track;
+    track.times = {0.0, 1.0 / 30.0};
+    track.values = {about_y(0.0), about_y(turn)};
+    const double half = 0.5 * (degrees - 360.0 * std::ceil(degrees / 360.0 - 0.5)) * std::numbers::pi / 180.0;
+    Eigen::Matrix3d expected = Eigen::Matrix3d::Identity();
+    expected(0, 0) = expected(2, 2) = std::cos(half);
+    expected(0, 2) = std::sin(half);
+    expected(2, 0) = -std::sin(half);
+    EXPECT_LT((sample(track, 1.0 / 60.0).toRotationMatrix() - expected).norm(), 1e-12) << degrees;
+  }
+  // The other sign of a quaternion is the same key; at half a turn alone it is the other way.
+  RotationTrack back;
+  back.times = {0.0, 1.0};
+  back.values = {about_y(0.0), about_y(-std::numbers::pi)};
+  EXPECT_LT((sample(back, 0.5) * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitX()).norm(), 1e-12);
+}
+
 TEST(RotationTrack, CubicSplineIsUnitAndMeetsItsKeys) {
   RotationTrack track;
   track.interpolation = Interpolation::CubicSpline;
