@@ -177,8 +177,11 @@ double asymmetry(const Body& body, const Points& x) {
 // The arm and the bar are their own mirror images in z; one bends about z, the other's base jerks along y.
 TEST(Extremes, X34AMirroredBodyMovesAsItsMirrorImage) {
   ExtremesTable table("X34", "Bodies that are their own mirror image move as such to 1e-9.");
-  table.excuse("blended-stiffness, corotational: the jerked bar to 1e-9",
-               "conjugate gradients end at 1e-6 of the forces, here of 500 m/s^2: 1e-7 m");
+  table.excuse(
+      "blended-stiffness: the jerked bar to 1e-9",
+      "its preconditioner is a factor in float, which rounds the two sides differently, and conjugate "
+      "gradients end at 1e-6 of the forces, here of 500 m/s^2: that is left (1e-15 by a factor in "
+      "double); no option asks for more");
   const Arm arm = small_arm();
   const Body elbow = small_arm_body(arm, 60 * kDegree), bar = short_bar(kFirm, kDamped);
   const Motion bend = [](double time) { return arm_pose(60 * kDegree * smooth_step(2.0 * time)); };
@@ -192,8 +195,7 @@ TEST(Extremes, X34AMirroredBodyMovesAsItsMirrorImage) {
     table.at_most("asymmetry", asymmetry(elbow, bent.x), 1e-9);
     const Extreme jerked = run_extreme({bar, jerk, options, 30});
     table.add("bar", rung, jerked);
-    const bool iterated = rung == "blended-stiffness" || rung == "corotational";
-    table.at_most("asymmetry", asymmetry(bar, jerked.x), iterated ? 1e-7 : 1e-9);
+    table.at_most("asymmetry", asymmetry(bar, jerked.x), rung == "blended-stiffness" ? 1e-7 : 1e-9);
   }
 }
 
