@@ -40,6 +40,10 @@ class CellGroups {
   static Eigen::Vector3d corner(int cell, int corner, const std::vector<double>& vectors) {
     return three(vectors.data() + place(cell, corner));
   }
+  static void add_at(int cell, int corner, const Eigen::Vector3d& force, std::vector<double>& vectors) {
+    double* at = vectors.data() + place(cell, corner);
+    for (int i = 0; i < 3; ++i) at[i * kCells] += force[i];
+  }
   /// Sum over the cells round a leaf vertex, in their order, of what `vectors` has at it.
   Eigen::Vector3d sum_at(int vertex, const std::vector<double>& vectors) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();

@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "fem/frames.h"
+#include "fem/models/collapse.h"
 
 namespace sinew::fem::detail {
 namespace {
@@ -76,35 +77,115 @@ SINEW_INLINE void multiply(const double* block, const Vector& u, Vector& y) {
   }
 }
 
+/// result = R y.
+SINEW_INLINE void store_turned(const Matrix& r, const Vector& y, double* result) {
+  for (int k = 0; k < CellGroups::kDofs; k += 3) {
+    for (int i = 0; i < 3; ++i, result += kCells)
+      store((r[i][0] * y[k] + r[i][1] * y[k + 1]) + r[i][2] * y[k + 2], result);
+  }
+}
+
+SINEW_INLINE void add_places(const CellGroups& groups, int group, std::span<const TurnedPlace> places,
+                             Vector& u) {
+  const int* vertices = groups.vertices(group);
+  Matrix r = {};
+  for (const TurnedPlace& place : places) {
+    if (place.rotations == nullptr) {
+      add(vertices, place.x->data(), place.share, u);
+      continue;
+    }
+    load_rotations(groups, group, *place.rotations, r);
+    add_turned(vertices, place.x->data(), place.share, r, u);
+  }
+}
+
 struct Kernel {
   const CellGroups& groups;
   const std::vector<Eigen::Matrix3d>& rotations;
   std::span<const TurnedPlace> places;
 
   SINEW_INLINE void run(int group, const double* stiffness, double* result) const {
-    const int* vertices = groups.vertices(group);
     Vector u = {}, y = {};
     Matrix r;
-    for (const TurnedPlace& place : places) {
-      if (place.rotations == nullptr) {
-        add(vertices, place.x->data(), place.share, u);
-        continue;
-      }
-      load_rotations(groups, group, *place.rotations, r);
-      add_turned(vertices, place.x->data(), place.share, r, u);
-    }
+    add_places(groups, group, places, u);
     multiply(stiffness, u, y);
     load_rotations(groups, group, rotations, r);
-    for (int k = 0; k < CellGroups::kDofs; k += 3) {
-      for (int i = 0; i < 3; ++i, result += kCells)
-        store((r[i][0] * y[k] + r[i][1] * y[k + 1]) + r[i][2] * y[k + 2], result);
-    }
+    store_turned(r, y, result);
   }
   SINEW_WIDE_LANES static void run_wide(const Kernel& k, int group, const double* stiffness, double* result) {
     k.run(group, stiffness, result);
   }
   static void run_any(const Kernel& k, int group, const double* stiffness, double* result) {
     k.run(group, stiffness, result);
+  }
+};
+
+/// k_i - p x G_i for k in `forces`, with the spin p = (tr(S) I - S)^-1 sum_i y_i x k_i of S = sum_i y_i
+/// G_i^T. All of it is the same for y that is too long by `share`. Returns what is at most `slim` where the
+/// least two stretches sum to kCollapse.
+SINEW_INLINE void take_spin(const Vector& y, const double* mean, double share, Vector& forces, double* slim) {
+  Double4 torque[3] = {}, s[3][3] = {}, g[3];
+  for (int k = 0; k < CellGroups::kDofs; k += 3) {
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      load(mean + (k + i) * kCells, g[i]);
+      torque[i] += y[k + j] * forces[k + l] - y[k + l] * forces[k + j];
+      for (int m = 0; m < 3; ++m) s[m][i] += y[k + m] * g[i];
+    }
+  }
+  Double4 a[3], b[3], cofactor[3][3];  // diagonal of tr(S) I - S, and off it the entry of the other two axes
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, l = (i + 2) % 3;
+    a[i] = s[j][j] + s[l][l];
+    b[i] = -0.5 * (s[j][l] + s[l][j]);
+  }
+  Double4 size = {};
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, l = (i + 2) % 3;
+    cofactor[i][i] = a[j] * a[l] - b[i] * b[i];
+    cofactor[j][l] = cofactor[l][j] = b[j] * b[l] - a[i] * b[i];
+    size += a[i] * a[i] + 2.0 * (b[i] * b[i]);
+  }
+  const Double4 det = (a[0] * cofactor[0][0] + b[2] * cofactor[0][1]) + b[1] * cofactor[0][2];
+  const Double4 minors = (cofactor[0][0] + cofactor[1][1]) + cofactor[2][2];
+  const Double4 scale = det / (det * det + (kLeastTurn * kLeastTurn) * (size * size * size));
+  Double4 spin[3];
+  for (int i = 0; i < 3; ++i)
+    spin[i] =
+        scale * ((cofactor[i][0] * torque[0] + cofactor[i][1] * torque[1]) + cofactor[i][2] * torque[2]);
+  for (int k = 0; k < CellGroups::kDofs; k += 3) {
+    for (int i = 0; i < 3; ++i) load(mean + (k + i) * kCells, g[i]);
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      forces[k + i] -= spin[j] * g[l] - spin[l] * g[j];
+    }
+  }
+  store(det - (share * kCollapse) * minors, slim);
+}
+
+struct PolarKernel {
+  const CellGroups& groups;
+  std::span<const TurnedPlace> places;
+
+  SINEW_INLINE void run(int group, const double* stiffness, const double* mean, double* result,
+                        double* slim) const {
+    Vector y = {}, u = {}, forces = {};
+    Matrix r = {};
+    add_places(groups, group, places.first(1), y);
+    add_places(groups, group, places.subspan(1), u);
+    for (int k = 0; k < CellGroups::kDofs; ++k) u[k] += y[k];
+    multiply(stiffness, u, forces);
+    take_spin(y, mean, places[0].share, forces, slim);
+    load_rotations(groups, group, *places[0].rotations, r);
+    store_turned(r, forces, result);
+  }
+  SINEW_WIDE_LANES static void run_wide(const PolarKernel& k, int group, const double* stiffness,
+                                        const double* mean, double* result, double* slim) {
+    k.run(group, stiffness, mean, result, slim);
+  }
+  static void run_any(const PolarKernel& k, int group, const double* stiffness, const double* mean,
+                      double* result, double* slim) {
+    k.run(group, stiffness, mean, result, slim);
   }
 };
 
@@ -208,6 +289,38 @@ void TurnedCells::forces(const std::vector<Eigen::Matrix3d>& rotations, std::spa
                                            : Kernel::run_any(kernel, g, stiffness, to);
                       }
                     });
+}
+
+void TurnedCells::polar_forces(const std::vector<double>& mean, std::span<const TurnedPlace> places,
+                               std::vector<double>& result, std::vector<char>& slim, Code code) const {
+  result.resize(groups_.vector_size());
+  slim.resize(static_cast<std::size_t>(groups_.num_cells()));
+  const PolarKernel kernel{groups_, places};
+  tbb::parallel_for(tbb::blocked_range<int>(0, groups_.num_groups(), 16),
+                    [&](const tbb::blocked_range<int>& range) {
+                      for (int g = range.begin(); g != range.end(); ++g) {
+                        const double* stiffness = values_.data() + kGroupSize * static_cast<std::size_t>(g);
+                        const double* of_group = mean.data() + CellGroups::vector_of(g);
+                        double* to = result.data() + CellGroups::vector_of(g);
+                        double over[kCells];
+                        code == Code::Wide ? PolarKernel::run_wide(kernel, g, stiffness, of_group, to, over)
+                                           : PolarKernel::run_any(kernel, g, stiffness, of_group, to, over);
+                        for (int lane = 0; lane < kCells && kCells * g + lane < groups_.num_cells(); ++lane)
+                          slim[static_cast<std::size_t>(kCells * g + lane)] = !(over[lane] > 0.0);
+                      }
+                    });
+}
+
+std::vector<double> packed(const CellGroups& groups, std::span<const lattice::HexGradients> cells) {
+  std::vector<double> result;
+  result.reserve(groups.vector_size());
+  for (int g = 0; g < groups.num_groups(); ++g) {
+    for (int dof = 0; dof < CellGroups::kDofs; ++dof) {
+      for (int lane = 0; lane < kCells; ++lane)
+        result.push_back(cells[static_cast<std::size_t>(groups.cell(g, lane))](dof / 3, dof % 3));
+    }
+  }
+  return result;
 }
 
 void polar_rotations(std::span<Eigen::Matrix3d> matrices, Code code) {

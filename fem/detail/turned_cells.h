@@ -33,6 +33,12 @@ class TurnedCells {
   /// R K sum_k share_k R_k^T x_k of every cell, as CellGroups has vectors.
   void forces(const std::vector<Eigen::Matrix3d>& rotations, std::span<const TurnedPlace> places,
               std::vector<double>& result, Code code = best_code()) const;
+  /// The same with the forces of the turn that R, the polar rotation of the first place, makes with that
+  /// place: what is left is the slope of a potential (fem/models/corotational_cells.h). `mean`: G of every
+  /// cell, packed. `slim`, one per cell: whether it may be near collapse (fem/models/collapse.h); those
+  /// forces are not in.
+  void polar_forces(const std::vector<double>& mean, std::span<const TurnedPlace> places,
+                    std::vector<double>& result, std::vector<char>& slim, Code code = best_code()) const;
 
  private:
   static constexpr std::size_t kBlocks = 36;  ///< of 3 x 3, by rows: (0,0), (0,1) .. (0,7), (1,1) ..
@@ -42,6 +48,9 @@ class TurnedCells {
   CellGroups groups_;
   std::vector<double> values_;  ///< group, block, row and column of the block, lane.
 };
+
+/// One row per corner of every cell, as CellGroups has vectors.
+std::vector<double> packed(const CellGroups& groups, std::span<const lattice::HexGradients> cells);
 
 /// Replaces matrices by the rotations of their polar decompositions, the nearest proper ones where they
 /// mirror.

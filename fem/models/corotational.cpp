@@ -5,9 +5,7 @@
 namespace sinew::fem {
 
 std::unique_ptr<Model> make_corotational(const Body& body, const SolverOptions&) {
-  return make_rotated_model(
-      "corotational", body,
-      [polar = PolarRotations(body)](const lattice::Points& x, const PosedFrames&) { return polar(x); });
+  return make_polar_model("corotational", body);
 }
 
 }  // namespace sinew::fem

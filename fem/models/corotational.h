@@ -3,7 +3,8 @@
 #include "fem/models/model.h"
 
 /// Corotational flesh: every leaf cell is linear in its own rotation, the polar part of its mean deformation
-/// gradient, taken at the predicted end of the stage.
+/// gradient. The forces are the slope of a potential (fem/models/corotational_cells.h), linear for a stage
+/// from its predicted end on.
 namespace sinew::fem {
 
 std::unique_ptr<Model> make_corotational(const Body& body, const SolverOptions& options);

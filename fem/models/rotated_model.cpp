@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <limits>
+#include <memory>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -12,17 +15,36 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "fem/detail/anderson_mixing.h"
 #include "fem/detail/turned_cells.h"
 #include "fem/models/balance.h"
+#include "fem/models/corotational_cells.h"
 #include "fem/models/free_system.h"
+#include "fem/models/newton_solver.h"
 #include "fem/models/repeated_factor.h"
+#include "fem/placement.h"
 
 namespace sinew::fem {
 namespace {
 
 using lattice::Points;
 using Rotations = std::vector<Eigen::Matrix3d>;
+
+/// Polar rotations of the last few places: where a stage ends the next ones look back to.
+class RememberedRotations {
+ public:
+  const Rotations& at(const Points& x, const PolarRotations& rotations) {
+    for (const auto& [place, known] : last_) {
+      if (place.rows() == x.rows() && place == x) return known;
+    }
+    if (last_.size() == kMost) last_.pop_front();
+    last_.emplace_back(x, rotations(x));
+    return last_.back().second;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 6;
+  std::deque<std::pair<Points, Rotations>> last_;
+};
 
 class RotatedModel final : public Model {
  public:
@@ -35,15 +57,23 @@ class RotatedModel final : public Model {
         free_(free_vertices(body)),
         system_(body, free_),
         factor_(FactorUse::Preconditioner) {}
+  /// With polar rotations.
+  RotatedModel(std::string name, const Body& body, const RotatedOptions& options)
+      : RotatedModel(std::move(name), body, CellRotations(), options) {
+    polar_.emplace(body, cells_);
+    rotations_ = [this](const Points& x, const PosedFrames&) {
+      return remembered_.at(x, polar_->rotations());
+    };
+  }
 
   SolveReport prepare(double, Integrator) override { return {}; }
 
   SolveReport solve_stage(const StageProblem& problem, Points& velocity) override {
     const Balance balance = stage_balance(body_, problem);
     Points move = balance.guess;
-    const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
-    const Points residual = residual_of(balance, rotations, move);
-    SolveReport report = correct(balance, rotations, residual, enough_for(problem.h, residual), move);
+    SolveReport report =
+        polar_ ? solve_polar(balance, problem.h, stage_of(problem.integrator).eta * problem.h, move)
+               : solve_linear(balance, problem.h, move);
     if (report.ok()) velocity = move / (stage_of(problem.integrator).eta * problem.h);
     return report;
   }
@@ -51,7 +81,7 @@ class RotatedModel final : public Model {
   SolveReport equilibrate(const PoseProblem& problem, Points& x) override;
 
   CellForces cell_forces(const Points& x, const PosedFrames& pose) override {
-    return cells_.forces(x, rotations_(x, pose));
+    return polar_ ? (*polar_)(x) : cells_.forces(x, rotations_(x, pose));
   }
 
   SolverCounts counts() const override {
@@ -70,7 +100,12 @@ class RotatedModel final : public Model {
     const double share = std::min(options_.loosest, options_.time_share * angle * angle);
     return std::max(options_.tolerance * scale_, share * residual.norm());
   }
-  Points residual_of(const Balance& balance, const Rotations& rotations, const Points& move);
+  SolveReport solve_linear(const Balance& balance, double h, Points& move);
+  SolveReport solve_newton(const Balance& balance, double tolerance, Points& move);
+  SolveReport solve_polar(const Balance& balance, double h, double eta_h, Points& move);
+  std::vector<Rotations> past_rotations(const Balance& balance);
+  Points residual_of(const Balance& balance, const Rotations& rotations, const std::vector<Rotations>& past,
+                     const Points& move);
   Points apply(const Balance& balance, const Rotations& rotations, const Points& dx);
   SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
                       double enough, Points& move);
@@ -83,30 +118,42 @@ class RotatedModel final : public Model {
   CellRotations rotations_;
   RotatedOptions options_;
   RotatedStiffness cells_;
+  RememberedRotations remembered_;
+  std::optional<PolarForces> polar_;  ///< where the rotations follow the places.
   FreeVertices free_;
   BlockSystem system_;
   std::vector<double> corner_forces_;  ///< a buffer.
+  bool near_collapse_ = false;         ///< some cell, at the last residual.
   double scale_ = 0.0;                 ///< of the forces at the last residual.
+
+  std::unique_ptr<CellEnergy> potential_;  ///< of polar rotations, made when it is first needed,
+  std::optional<NewtonSolver> newton_;     ///< like its solver.
 
   RepeatedFactor factor_;
   double factor_inertia_ = -1.0, factor_damping_ = -1.0;
   Rotations factor_rotations_;
 };
 
-/// Forces left over at the unknowns.
-Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations, const Points& move) {
-  const Points x = balance.origin + move;
+std::vector<Rotations> RotatedModel::past_rotations(const Balance& balance) {
   std::vector<Rotations> past;
+  if (balance.damping == 0.0) return past;
+  for (const PastPlace& place : balance.past) past.push_back(rotations_(*place.x, *place.pose));
+  return past;
+}
+
+/// Forces left over at the unknowns.
+Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations,
+                                 const std::vector<Rotations>& past, const Points& move) {
+  const Points x = balance.origin + move;
   std::vector<detail::TurnedPlace> places{{1.0 + balance.damping, &x, &rotations},
                                           {-1.0, &body_.mesh.points}};
-  if (balance.damping > 0.0) {
-    past.reserve(balance.past.size());
-    for (const PastPlace& place : balance.past) {
-      past.push_back(rotations_(*place.x, *place.pose));
-      places.push_back({-balance.damping * place.share, place.x, &past.back()});
-    }
+  for (std::size_t k = 0; k < past.size(); ++k)
+    places.push_back({-balance.damping * balance.past[k].share, balance.past[k].x, &past[k]});
+  if (polar_) {
+    near_collapse_ = (*polar_)(places, corner_forces_);
+  } else {
+    cells_.cells().forces(rotations, places, corner_forces_);
   }
-  cells_.cells().forces(rotations, places, corner_forces_);
   Points elastic(x.rows(), 3);
   for (int a = 0; a < body_.mesh.num_vertices(); ++a)
     elastic.row(a) = cells_.cells().groups().sum_at(a, corner_forces_).transpose();
@@ -225,17 +272,76 @@ SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotat
   return report;
 }
 
+SolveReport RotatedModel::solve_linear(const Balance& balance, double h, Points& move) {
+  const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
+  const Points residual = residual_of(balance, rotations, past_rotations(balance), move);
+  return correct(balance, rotations, residual, enough_for(h, residual), move);
+}
+
+/// One linear solve as a rule. Its forces balance but for the square of what turns and stretches have changed
+/// on the way; where that is not small they are looked at, and balanced by more such solves or, where these
+/// do not get there soon, by Newton's method.
+SolveReport RotatedModel::solve_polar(const Balance& balance, double h, double eta_h, Points& move) {
+  constexpr double kSmall = 0.002;
+  // Of the first residual. At 0.01 a bar jerked by 1.14 lengths is left to Newton's method, which finds a
+  // rest with cells inside out.
+  constexpr double kGood = 0.1;
+  constexpr int kRounds = 4;
+  const std::vector<Rotations> past = past_rotations(balance);
+  SolveReport total;
+  double first = 0.0, last = 0.0, enough = 0.0;
+  for (int round = 0;; ++round) {
+    // As later stages will have it to the last digit when they look back.
+    Points x = balance.origin + eta_h * (move / eta_h);
+    place_bones(body_, *balance.pose, x);
+    const Rotations rotations = rotations_(x, *balance.pose);
+    const Points residual = residual_of(balance, rotations, past, move);
+    const double left = residual.norm();
+    if (round == 0) {
+      first = left;
+      enough = enough_for(h, residual);
+    } else if (left <= std::max(enough, kGood * first)) {
+      return total;
+    } else if (round == kRounds || !(left <= (round == 1 ? 10.0 : 0.5) * last)) {
+      break;
+    }
+    last = left;
+    const Points before = move;
+    const SolveReport step = correct(balance, rotations, residual, enough, move);
+    total.iterations += step.iterations;
+    total.residual = step.residual;
+    if (!step.ok()) return step;
+    if (!near_collapse_ && polar_->rotations().largest_change(move - before) <= kSmall) return total;
+  }
+  move = balance.guess;
+  return solve_newton(balance, NewtonOptions().tolerance, move);
+}
+
+SolveReport RotatedModel::solve_newton(const Balance& balance, double tolerance, Points& move) {
+  if (!newton_) {
+    potential_ = corotational_cells(body_);
+    NewtonOptions options;
+    options.rest_tolerance = options_.rest_tolerance;
+    options.max_rest_iterations = options_.max_rest_iterations;
+    newton_.emplace(name_, body_, free_, system_, *potential_, options);
+  }
+  return newton_->solve(balance, tolerance, move);
+}
+
 SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
   const Balance balance = rest_balance(body_, problem, x);
   Points move = balance.guess;
+  if (polar_) {
+    const SolveReport report = solve_newton(balance, options_.rest_tolerance, move);
+    if (report.ok()) x = balance.origin + move;
+    return report;
+  }
   SolveReport total;
-  Points residual;
+  const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
   const double extent = balance.origin.rowwise().norm().maxCoeff();
-  detail::AndersonMixing mixing(5);
-  constexpr int kMixed = 200;
+  Points residual;
   for (; total.iterations < options_.max_rest_iterations; ++total.iterations) {
-    const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
-    residual = residual_of(balance, rotations, move);
+    residual = residual_of(balance, rotations, {}, move);
     total.residual = residual.norm() / std::max(scale_, std::numeric_limits<double>::min());
     if (!std::isfinite(total.residual)) break;
     if (residual.norm() <= options_.rest_tolerance * scale_) {
@@ -246,9 +352,6 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
     const SolveReport step =
         correct(balance, rotations, residual, 0.1 * options_.rest_tolerance * scale_, move);
     if (!step.ok()) return step;
-    // Mixing halves the iterations where rotations are smooth. Those of cells turned inside out jump, and
-    // there patience is better.
-    if (total.iterations < kMixed) move = before + free_.spread(mixing.step(free_.gather(move - before)));
     if ((move - before).cwiseAbs().maxCoeff() <= 1e-15 * extent) {
       x = balance.origin + move;
       total.message = kStagnated;
@@ -268,6 +371,10 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
 std::unique_ptr<Model> make_rotated_model(std::string name, const Body& body, CellRotations rotations,
                                           const RotatedOptions& options) {
   return std::make_unique<RotatedModel>(std::move(name), body, std::move(rotations), options);
+}
+
+std::unique_ptr<Model> make_polar_model(std::string name, const Body& body, const RotatedOptions& options) {
+  return std::make_unique<RotatedModel>(std::move(name), body, options);
 }
 
 }  // namespace sinew::fem

@@ -18,7 +18,7 @@ struct RotatedOptions {
   double rest_tolerance = 1e-10;  ///< the same at rest.
   /// Iterations after which the preconditioner is factored anew; >= 1.
   int stale_after = 15;
-  int max_rest_iterations = 500;  ///< of the rotations at rest; >= 1.
+  int max_rest_iterations = 200;  ///< >= 1.
 };
 
 /// A model whose cells are linear in rotations of their own: one symmetric system per stage,
@@ -28,5 +28,11 @@ struct RotatedOptions {
 /// swings.
 std::unique_ptr<Model> make_rotated_model(std::string name, const Body& body, CellRotations rotations,
                                           const RotatedOptions& options = {});
+
+/// The same with the polar rotations of the cells, which follow the places, and forces that are the slope of
+/// a potential (fem/models/corotational_cells.h). A stage that changes the cells much is solved again with
+/// their new rotations until its forces balance, in the last resort, as a rest is, by Newton's method.
+std::unique_ptr<Model> make_polar_model(std::string name, const Body& body,
+                                        const RotatedOptions& options = {});
 
 }  // namespace sinew::fem

@@ -1,10 +1,13 @@
 #include "fem/models/rotated_stiffness.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <tbb/parallel_for.h>
 
 #include "fem/detail/turned_cells.h"
+#include "fem/models/collapse.h"
 
 namespace sinew::fem {
 
@@ -43,6 +46,36 @@ std::vector<Eigen::Matrix3d> PolarRotations::operator()(const Points& x) const {
   return rotations;
 }
 
+double PolarRotations::largest_change(const Points& move) const {
+  double largest = 0.0;
+  for (std::size_t c = 0; c < mean_gradient_.size(); ++c) {
+    const Eigen::Matrix3d change = cell_points(move, body_.mesh.cells[c]) * mean_gradient_[c];
+    largest = std::max(largest, change.squaredNorm());
+  }
+  return std::sqrt(largest);
+}
+
+namespace {
+
+/// Energy 1/2 u^T f of cells with forces f.
+CellForces with_energy(const Body& body, const detail::CellGroups& groups, const Points& x,
+                       const std::vector<Eigen::Matrix3d>& rotations, const std::vector<double>& corners) {
+  CellForces result;
+  result.energy.resize(rotations.size());
+  result.force.resize(rotations.size());
+  tbb::parallel_for(std::size_t{0}, rotations.size(), [&](std::size_t c) {
+    CellPoints force;
+    for (int k = 0; k < 8; ++k) force.col(k) = groups.corner(static_cast<int>(c), k, corners);
+    const CellPoints u =
+        cell_points(x, body.mesh.cells[c]) - rotations[c] * cell_points(body.mesh.points, body.mesh.cells[c]);
+    result.energy[c] = 0.5 * u.cwiseProduct(force).sum();
+    result.force[c] = Eigen::Map<const CellVector>(force.data());
+  });
+  return result;
+}
+
+}  // namespace
+
 RotatedStiffness::RotatedStiffness(const Body& body)
     : body_(body),
       cells_(std::make_shared<detail::TurnedCells>(
@@ -51,6 +84,8 @@ RotatedStiffness::RotatedStiffness(const Body& body)
             return cell_stiffness(lattice::hex_corners(body.mesh.points, body.mesh.cells[c]), body.fill[c],
                                   body.materials[c]);
           })) {}
+
+CellStiffness RotatedStiffness::at_rest(int cell) const { return cells_->stiffness(cell); }
 
 CellStiffness RotatedStiffness::rotated(int cell, const Eigen::Matrix3d& rotation) const {
   const CellStiffness k = cells_->stiffness(cell);
@@ -65,16 +100,53 @@ CellForces RotatedStiffness::forces(const Points& x, const std::vector<Eigen::Ma
   std::vector<double> corners;
   const std::array<detail::TurnedPlace, 2> displacement{{{1.0, &x, &rotations}, {-1.0, &body_.mesh.points}}};
   cells_->forces(rotations, displacement, corners);
-  CellForces result;
-  result.energy.resize(rotations.size());
-  result.force.resize(rotations.size());
-  tbb::parallel_for(std::size_t{0}, rotations.size(), [&](std::size_t c) {
-    CellPoints force;
-    for (int k = 0; k < 8; ++k) force.col(k) = cells_->groups().corner(static_cast<int>(c), k, corners);
-    const CellPoints u = cell_points(x, body_.mesh.cells[c]) -
-                         rotations[c] * cell_points(body_.mesh.points, body_.mesh.cells[c]);
-    result.energy[c] = 0.5 * u.cwiseProduct(force).sum();
-    result.force[c] = Eigen::Map<const CellVector>(force.data());
+  return with_energy(body_, cells_->groups(), x, rotations, corners);
+}
+
+PolarForces::PolarForces(const Body& body, const RotatedStiffness& stiffness)
+    : body_(body),
+      stiffness_(stiffness),
+      rotations_(body),
+      mean_gradients_(detail::packed(stiffness.cells().groups(), rotations_.mean_gradients())),
+      collapse_(collapse_moduli(body)) {}
+
+template <class Action>
+bool PolarForces::each_near_collapse(const Points& x, const std::vector<char>& slim,
+                                     const Action& action) const {
+  bool any = false;
+  for (std::size_t c = 0; c < slim.size(); ++c) {
+    if (!slim[c]) continue;
+    const lattice::HexGradients& mean = rotations_.mean_gradient(c);
+    const PrincipalStretches f(cell_points(x, body_.mesh.cells[c]) * mean);
+    if (!f.near_collapse()) continue;
+    any = true;
+    action(c, f, CellPoints(collapse_[c] * collapse_stress(f) * mean.transpose()));
+  }
+  return any;
+}
+
+bool PolarForces::operator()(std::span<const detail::TurnedPlace> places,
+                             std::vector<double>& corners) const {
+  std::vector<char> slim;
+  stiffness_.cells().polar_forces(mean_gradients_, places, corners, slim);
+  return each_near_collapse(*places[0].x, slim,
+                            [&](std::size_t c, const PrincipalStretches&, const CellPoints& force) {
+                              for (int k = 0; k < 8; ++k)
+                                detail::CellGroups::add_at(static_cast<int>(c), k, force.col(k), corners);
+                            });
+}
+
+CellForces PolarForces::operator()(const Points& x) const {
+  const std::vector<Eigen::Matrix3d> rotations = rotations_(x);
+  const std::array<detail::TurnedPlace, 2> displacement{{{1.0, &x, &rotations}, {-1.0, &body_.mesh.points}}};
+  std::vector<double> corners;
+  std::vector<char> slim;
+  stiffness_.cells().polar_forces(mean_gradients_, displacement, corners, slim);
+  // The forces of the turn do no work on y - X.
+  CellForces result = with_energy(body_, stiffness_.cells().groups(), x, rotations, corners);
+  each_near_collapse(x, slim, [&](std::size_t c, const PrincipalStretches& f, const CellPoints& force) {
+    result.energy[c] += collapse_[c] * collapse_energy(f);
+    result.force[c] += Eigen::Map<const CellVector>(force.data());
   });
   return result;
 }

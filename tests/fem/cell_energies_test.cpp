@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "fem/models/corotational_cells.h"
 #include "fem/models/green_strain.h"
 #include "fem/models/neo_hookean.h"
 #include "fem/models/springs.h"
@@ -45,6 +46,7 @@ std::vector<Law> laws(const Body& body) {
   all.push_back({"neo-hookean", neo_hookean_cells(body)});
   all.push_back({"stvk", stvk_cells(body)});
   all.push_back({"springs", spring_cells(body)});
+  all.push_back({"corotational", corotational_cells(body)});
   return all;
 }
 

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "fem/cell_report.h"
+#include "fem/models/balance.h"
 #include "fem/models/springs.h"
 #include "fem/simulation.h"
 #include "tests/fem/arm.h"
@@ -269,6 +270,29 @@ TEST(Blended, RestsWhereARunSettles) {
   ASSERT_TRUE(rest.report.ok()) << rest.report.message;
   // Settled at 1e-10 m/s, at rates of some 10 per second.
   EXPECT_LE(largest_distance(rest.x, simulation.state().x), 1e-9);
+}
+
+// The lower bone pushed along the arm through its own joint, and drawn to nine times its length: in both,
+// cells turn inside out, where their rotations jump from one place to the next. The forces balance
+// nevertheless.
+TEST(Corotational, ComesToRestWithCellsTurnedInsideOut) {
+  const tests::Arm arm = tests::make_arm(lattice::CellType::Hexahedron, 0, 2);
+  fem::BodyOptions body_options;
+  body_options.levels = 0;
+  const Body body = tests::arm_body(arm, 0.0, body_options);
+  for (double along : {-0.7, 4.0}) {
+    const PosePath path = [along](double factor) {
+      std::vector<Eigen::Affine3d> pose = tests::arm_pose(0.0);
+      for (std::size_t joint : {1, 2}) pose[joint].pretranslate(factor * along * Eigen::Vector3d::UnitX());
+      return pose;
+    };
+    const EquilibriumOptions options = without_gravity("corotational");
+    const Equilibrium rest = find_equilibrium(body, path, options);
+    ASSERT_TRUE(rest.report.ok()) << along << ": " << rest.report.message;
+    EXPECT_EQ(rest.load_factor, 1.0);
+    EXPECT_LE(rest.report.residual, 1e-10);
+    EXPECT_LT(least_stretch(body, rest.x).stretch, 0.0) << "no cell is inside out";
+  }
 }
 
 // The soft bar of the reference under its full weight: St. Venant-Kirchhoff has no answer beyond 0.465 g.

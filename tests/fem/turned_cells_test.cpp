@@ -107,6 +107,24 @@ TEST(TurnedCells, GiveTheSameBitsOnWideAndNarrowRegisters) {
   EXPECT_EQ(cells.forces(Code::Portable), cells.forces(best_code()));
 }
 
+// What polar forces are the slope of is asked in models_test.cpp.
+TEST(TurnedCells, GivePolarForcesOfTheSameBitsOnWideAndNarrowRegisters) {
+  std::mt19937_64 rng(36);
+  const Cells cells(rng, 11);
+  std::vector<lattice::HexGradients> mean(11);
+  for (lattice::HexGradients& g : mean)
+    g = lattice::HexGradients::NullaryExpr([&] { return tests::uniform(rng, -1.0, 1.0); });
+  const TurnedCells turned = cells.turned();
+  const std::vector<double> gradients = packed(turned.groups(), mean);
+  const std::array<TurnedPlace, 2> places{{{1.3, &cells.x, &cells.rotations}, {-1.0, &cells.rest}}};
+  std::vector<double> portable, best;
+  std::vector<char> slim_portable, slim_best;
+  turned.polar_forces(gradients, places, portable, slim_portable, Code::Portable);
+  turned.polar_forces(gradients, places, best, slim_best, best_code());
+  EXPECT_EQ(portable, best);
+  EXPECT_EQ(slim_portable, slim_best);
+}
+
 TEST(TurnedCells, GiveTheirMatricesBack) {
   std::mt19937_64 rng(33);
   const Cells cells(rng, 6);
