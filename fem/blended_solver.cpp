@@ -81,7 +81,8 @@ Factor::Report BlendedSolver::prepare(double h, Integrator integrator) {
     } else {
       const RegionSystem& system = impl_->systems[i];
       reports[i] = factors[i].factorise(detail::region_matrix(*impl_->body, system, c),
-                                        impl_->options.precision, detail::wanted_rows(system));
+                                        impl_->options.precision.value_or(Precision::Double),
+                                        detail::wanted_rows(system));
     }
   });
   for (std::size_t i = 0; i < reports.size(); ++i) {

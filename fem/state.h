@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "fem/factor.h"
@@ -32,7 +33,9 @@ struct StagePoses {
 enum class Basis { Hierarchical, Nodal };
 
 struct SolverOptions {
-  Precision precision = Precision::Double;
+  /// Of factors that last over many steps; left out: double in `blended`, whose solutions they are, and float
+  /// where they precondition. Models that factor in every iteration do so in double.
+  std::optional<Precision> precision;
   Basis basis = Basis::Hierarchical;
   /// Rings of leaf cells round a region whose results are computed and discarded [-]; >= 0. Without a ring
   /// five and more regions blow up at 1/24 s.

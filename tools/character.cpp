@@ -303,6 +303,11 @@ void warn_of_drive(const Scene& scene, const Talk& talk) {
          "' is linear in the bones' frames and nothing turns with this flesh; hint: --model corotational");
 }
 
+void warn_of_precision(const Scene& scene, const Talk& talk) {
+  if (scene.precision && !fem::find_model(scene.model)->keeps_factors)
+    talk("warning: precision: does nothing, as model '" + scene.model + "' keeps no factors");
+}
+
 void load_plain(const Scene& scene, const Talk& talk, Character& c) {
   warn_of_drive(scene, talk);
   const Phase phase(c.times, "lattice");
@@ -319,6 +324,7 @@ void load_plain(const Scene& scene, const Talk& talk, Character& c) {
 
 Character make_character(const Scene& scene, const Talk& talk) {
   Character c;
+  warn_of_precision(scene, talk);
   if (scene.plain) {
     load_plain(scene, talk, c);
   } else {

@@ -138,7 +138,7 @@ struct Scene {
   std::string model{fem::kDefaultModel};
   Integrator integrator = Integrator::Bdf2;
   /// Float factors solve faster, with a relative error near 3e-7.
-  Precision precision = Precision::Double;
+  std::optional<Precision> precision;  ///< left out: the model's own choice.
   /// Output frames per second [1/s]; 0.1 ... 1e4. 30, the rate at which most clips for games are keyed: a key
   /// falls on a frame, and a frame is four default steps.
   double fps = 30.0;

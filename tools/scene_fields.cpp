@@ -97,7 +97,8 @@ constexpr auto kFields = std::to_array<SceneField>({
      "bdf2, backward-euler (more damped, cannot fail), tr-bdf2 (two solves, most exact) or "
      "implicit-midpoint (keeps energy, rings after a jolt)"},
     {"precision", &Scene::precision,
-     "of the factors: double; faster: float, off by 3e-7 of what a step changes; short (16 bits), by 1e-4"},
+     "of factors that last: double (blended if left out), float (blended-stiffness, corotational) or short "
+     "(16 bits, the fastest; blended is off by 1e-4 of what a step changes)"},
     {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
     {"frames", &Scene::frames, "output frames A-B, both included; left out: the whole clip"},
     {"settle",
@@ -327,7 +328,7 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
           [](std::vector<std::string> Scene::*) {},
           [](Switch Scene::*) {},
           [](Integrator Scene::*) {},
-          [](Precision Scene::*) {},
+          [](std::optional<Precision> Scene::*) {},
           [](OutputSpace Scene::*) {},
           [&](int Scene::*member) { check_number(field, scene.*member, where); },
           [&](double Scene::*member) { check_number(field, scene.*member, where); },
@@ -399,7 +400,7 @@ void set_from_text(Scene& scene, const SceneField& field, std::string_view text,
           [&](Integrator Scene::*member) {
             scene.*member = parse_choice<Integrator>(kIntegratorNames, text, where);
           },
-          [&](Precision Scene::*member) {
+          [&](std::optional<Precision> Scene::*member) {
             scene.*member = parse_choice<Precision>(kPrecisionNames, text, where);
           },
           [&](OutputSpace Scene::*member) {
@@ -435,7 +436,9 @@ std::string flag_text(const Scene& scene, const SceneField& field) {
                                  : std::string();
           },
           [&](Integrator Scene::*member) { return choice(kIntegratorNames, scene.*member); },
-          [&](Precision Scene::*member) { return choice(kPrecisionNames, scene.*member); },
+          [&](std::optional<Precision> Scene::*member) {
+            return scene.*member ? choice(kPrecisionNames, *(scene.*member)) : std::string();
+          },
           [&](OutputSpace Scene::*member) { return choice(kOutputSpaceNames, scene.*member); },
       },
       field.member);

@@ -4,8 +4,8 @@
 
 namespace sinew::fem {
 
-std::unique_ptr<Model> make_corotational(const Body& body, const SolverOptions&) {
-  return make_polar_model("corotational", body);
+std::unique_ptr<Model> make_corotational(const Body& body, const SolverOptions& options) {
+  return make_polar_model("corotational", body, rotated_options(options));
 }
 
 }  // namespace sinew::fem

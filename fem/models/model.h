@@ -78,6 +78,8 @@ struct ModelInfo {
   std::string_view description;  ///< one line.
   /// False: flesh has no inertia and stands at every instant where the pose alone puts it.
   bool dynamic = true;
+  /// Its factors last over many steps, so that SolverOptions::precision counts.
+  bool keeps_factors = false;
   std::unique_ptr<Model> (*make)(const Body& body, const SolverOptions& options) = nullptr;
 };
 

@@ -14,20 +14,23 @@ namespace sinew::fem {
 namespace {
 
 constexpr bool kDynamic = true, kPlaced = false;
+constexpr bool kLasting = true, kFresh = false;  // factors
 
 constexpr auto kModels = std::to_array<ModelInfo>({
-    {"skin", "free-form deformation: lattice vertices skinned by the bones; no dynamics", kPlaced, make_skin},
+    {"skin", "free-form deformation: lattice vertices skinned by the bones; no dynamics", kPlaced, kFresh,
+     make_skin},
     {"springs", "mass-spring on cell edges and diagonals, matched to E; Poisson's ratio is 1/4", kDynamic,
-     make_springs},
+     kFresh, make_springs},
     {"blended", "one prefactored linear system per region, blended by weights; the fast default", kDynamic,
-     make_blended},
+     kLasting, make_blended},
     {"blended-stiffness", "one linear system, cells turned by the blended rotation of their bones", kDynamic,
-     make_blended_stiffness},
-    {"corotational", "one linear system, cells turned by their own rotation", kDynamic, make_corotational},
+     kLasting, make_blended_stiffness},
+    {"corotational", "one linear system, cells turned by their own rotation", kDynamic, kLasting,
+     make_corotational},
     {"stvk", "St. Venant-Kirchhoff: finite strain by full Newton; collapses when squeezed to half", kDynamic,
-     make_stvk},
+     kFresh, make_stvk},
     {"neo-hookean", "neo-Hookean, safe under inversion, by full Newton: the reference of the others",
-     kDynamic, make_neo_hookean},
+     kDynamic, kFresh, make_neo_hookean},
 });
 
 }  // namespace

@@ -14,12 +14,12 @@ struct RepeatedFactor::Impl {
   mutable cholmod_common common;
   cholmod_factor* factor = nullptr;
   bool ok = false;
-  FactorUse use;
-  detail::PackedFactor packed;  ///< of a preconditioner.
+  std::optional<Precision> precision;
+  detail::PackedFactor packed;  ///< where there is a precision.
   mutable Eigen::VectorXd workspace;
   mutable cholmod_dense *solution = nullptr, *y = nullptr, *e = nullptr;  ///< CHOLMOD's own workspace.
 
-  explicit Impl(FactorUse what_for) : use(what_for) {
+  explicit Impl(std::optional<Precision> of_panels) : precision(of_panels) {
     detail::start_supernodal(common);
     common.quick_return_if_not_posdef = true;
   }
@@ -34,7 +34,7 @@ struct RepeatedFactor::Impl {
   Impl& operator=(const Impl&) = delete;
 };
 
-RepeatedFactor::RepeatedFactor(FactorUse use) : impl_(std::make_unique<Impl>(use)) {}
+RepeatedFactor::RepeatedFactor(std::optional<Precision> packed) : impl_(std::make_unique<Impl>(packed)) {}
 RepeatedFactor::~RepeatedFactor() = default;
 RepeatedFactor::RepeatedFactor(RepeatedFactor&&) noexcept = default;
 RepeatedFactor& RepeatedFactor::operator=(RepeatedFactor&&) noexcept = default;
@@ -42,7 +42,7 @@ RepeatedFactor& RepeatedFactor::operator=(RepeatedFactor&&) noexcept = default;
 bool RepeatedFactor::ok() const { return impl_->ok; }
 std::size_t RepeatedFactor::num_nonzeros() const {
   if (!impl_->ok) return 0;
-  return impl_->use == FactorUse::Preconditioner ? impl_->packed.num_values() : impl_->factor->xsize;
+  return impl_->precision ? impl_->packed.num_values() : impl_->factor->xsize;
 }
 
 Factor::Report RepeatedFactor::factorise(const Eigen::SparseMatrix<double>& lower) {
@@ -51,11 +51,11 @@ Factor::Report RepeatedFactor::factorise(const Eigen::SparseMatrix<double>& lowe
   Factor::Report report;
   Eigen::SparseMatrix<double> scaled;
   Eigen::VectorXd scale;
-  if (f.use == FactorUse::Preconditioner) {
+  if (f.precision) {
     scale = detail::jacobi_scale(lower.diagonal());
     scaled = scale.asDiagonal() * lower * scale.asDiagonal();
   }
-  cholmod_sparse view = detail::view_lower(f.use == FactorUse::Preconditioner ? scaled : lower);
+  cholmod_sparse view = detail::view_lower(f.precision ? scaled : lower);
   const detail::CholmodAlone alone;
   if (f.factor == nullptr) f.factor = cholmod_analyze(&view, &f.common);
   if (f.factor == nullptr) return {false, 0, "out of memory in the symbolic analysis"};
@@ -66,14 +66,14 @@ Factor::Report RepeatedFactor::factorise(const Eigen::SparseMatrix<double>& lowe
     return {false, pivot, "the matrix is not positive definite at row " + std::to_string(pivot)};
   }
   if (f.common.status < CHOLMOD_OK) return {false, 0, "out of memory in the factorisation"};
-  if (f.use == FactorUse::Preconditioner) f.packed = detail::PackedFactor(*f.factor, scale, Precision::Float);
+  if (f.precision) f.packed = detail::PackedFactor(*f.factor, scale, *f.precision);
   f.ok = report.ok = true;
   return report;
 }
 
 void RepeatedFactor::solve(Eigen::Ref<Eigen::VectorXd> b) const {
   const Impl& f = *impl_;
-  if (f.use == FactorUse::Preconditioner) return f.packed.solve(b, f.workspace);
+  if (f.precision) return f.packed.solve(b, f.workspace);
   cholmod_dense right{};
   right.nrow = right.d = static_cast<std::size_t>(b.size());
   right.ncol = 1;

@@ -1,22 +1,18 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "fem/factor.h"
 
 namespace sinew::fem {
 
-/// What a factor is made for.
-enum class FactorUse {
-  Solution,        ///< few solves, in double.
-  Preconditioner,  ///< many solves, from packed float panels: a third of the time, relative error near 3e-7.
-};
-
 /// Sparse Cholesky factors of matrices that share one pattern: the order is sought once (METIS or AMD), the
 /// numbers are made anew each time.
 class RepeatedFactor {
  public:
-  explicit RepeatedFactor(FactorUse use = FactorUse::Solution);
+  /// `packed`: for many solves, from panels of this precision; left out: for few, from CHOLMOD's own.
+  explicit RepeatedFactor(std::optional<Precision> packed = {});
   ~RepeatedFactor();
   RepeatedFactor(RepeatedFactor&&) noexcept;
   RepeatedFactor& operator=(RepeatedFactor&&) noexcept;

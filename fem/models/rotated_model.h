@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "fem/factor.h"
 #include "fem/models/rotated_stiffness.h"
 
 namespace sinew::fem {
@@ -18,8 +19,12 @@ struct RotatedOptions {
   double rest_tolerance = 1e-10;  ///< the same at rest.
   /// Iterations after which the preconditioner is factored anew; >= 1.
   int stale_after = 15;
-  int max_rest_iterations = 200;  ///< >= 1.
+  Precision precision = Precision::Float;  ///< of the preconditioner.
+  int max_rest_iterations = 200;           ///< >= 1.
 };
+
+/// The defaults with what a solver is asked for.
+RotatedOptions rotated_options(const SolverOptions& solver);
 
 /// A model whose cells are linear in rotations of their own: one symmetric system per stage,
 ///   [inertia M + P + (1 + damping) sum_e R_e K_e R_e^T] dx = residual,

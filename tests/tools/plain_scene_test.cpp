@@ -471,6 +471,9 @@ TEST_F(PlainScenes, WarnWhereTheModelCannotFollow) {
   EXPECT_THAT(said("blended"), HasSubstr("warning: model 'blended' is linear in the bones' frames"));
   EXPECT_THAT(said("skin"),
               HasSubstr("warning: model 'skin' has no dynamics: loads and velocity do nothing"));
+  EXPECT_THAT(said("stvk --precision short"),
+              HasSubstr("warning: precision: does nothing, as model 'stvk' keeps no factors"));
+  EXPECT_THAT(said("corotational --precision short"), testing::Not(HasSubstr("precision")));
   EXPECT_THAT(said("corotational"), testing::Not(HasSubstr("warning")));
 }
 

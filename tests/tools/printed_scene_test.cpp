@@ -55,7 +55,7 @@ Scene random_scene(std::mt19937_64& rng) {
   scene.step = 1e-6 + 0.09 * unit();
   scene.integrator = static_cast<Integrator>(index(4));
   if (index(2) == 1) scene.model = "neo-hookean";
-  scene.precision = static_cast<Precision>(index(3));
+  if (index(4) > 0) scene.precision = static_cast<Precision>(index(3));
   scene.fps = 1.0 + 100.0 * unit();
   if (index(2) == 1) scene.offset = 10.0 * unit();
   if (index(2) == 1) scene.frames = FrameRange{index(10), 10 + index(10)};
