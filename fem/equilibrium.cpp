@@ -75,6 +75,7 @@ Equilibrium find_equilibrium(const Body& body, const PosePath& path, const Equil
     // The last step ends at 1 itself.
     const double wanted = result.load_factor + step;
     const double factor = wanted > 1.0 - 1e-9 ? 1.0 : wanted;
+    if (options.before_step) options.before_step(result.load_factor);
     result.report = try_factor(factor);
     if (result.report.ok()) {
       result.load_factor = factor;

@@ -16,6 +16,9 @@ struct EquilibriumOptions {
   int steps = 4;  ///< wanted load steps; >= 1. Fewer where a step converges at once, more where it does not.
   int max_halvings = 10;  ///< of a load step before giving up; 0 .. 30.
   SolverOptions solver;
+  /// Told before every load step, also of one that is tried again, which factor is reached [-]. What it
+  /// throws ends the search.
+  std::function<void(double factor)> before_step;
 
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;

@@ -22,6 +22,7 @@
 #include "tools/failure.h"
 #include "tools/interrupt.h"
 #include "tools/plain_loads.h"
+#include "tools/progress.h"
 #include "tools/scene_fields.h"
 #include "tools/simulate_options.h"
 
@@ -200,7 +201,14 @@ void find_pose(const PoseRequest& request) {
   if (scene.plain) options.loads = loads_of(*scene.plain);
   const skeleton::Skeleton& skeleton = character.rig.skeleton;
   const skeleton::Pose wanted = skeleton::sample(skeleton, character.the_clip(), time);
+  constexpr int kParts = 1000;
+  Progress progress("posing", kParts);
+  options.before_step = [&](double factor) {
+    stop_if_interrupted(fmt::format("at load factor {:.3g}", factor));
+    progress.update(static_cast<int>(kParts * factor));
+  };
   const fem::Equilibrium found = fem::find_equilibrium(body, path_to(skeleton, wanted), options);
+  progress.finish();
   if (!found.report.ok())
     throw NumericalError(fmt::format("{}: {}", character.rig.file, found.report.message));
   const std::unique_ptr<fem::Model> model = fem::find_model(scene.model)->make(body, options.solver);

@@ -1,7 +1,9 @@
 // Statics of every model: patch tests, rigid motion, closed forms through the solver, loads, failure.
 #include "fem/equilibrium.h"
 
+#include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -270,6 +272,26 @@ TEST(Blended, RestsWhereARunSettles) {
   ASSERT_TRUE(rest.report.ok()) << rest.report.message;
   // Settled at 1e-10 m/s, at rates of some 10 per second.
   EXPECT_LE(largest_distance(rest.x, simulation.state().x), 1e-9);
+}
+
+TEST(Equilibrium, TellsWhatItReachesAndStopsWhereItIsToldTo) {
+  const Body body = tests::bar_body({});
+  EquilibriumOptions options;
+  options.model = "neo-hookean";
+  options.steps = 8;
+  std::vector<double> reached;
+  options.before_step = [&](double factor) { reached.push_back(factor); };
+  const PosePath still = held_pose({Eigen::Affine3d::Identity()});
+  const Equilibrium whole = find_equilibrium(body, still, options);
+  ASSERT_TRUE(whole.report.ok()) << whole.report.message;
+  ASSERT_EQ(static_cast<int>(reached.size()), whole.load_steps);
+  EXPECT_EQ(reached.front(), 0.0);
+  EXPECT_EQ(reached[1], 0.125);
+  EXPECT_TRUE(std::is_sorted(reached.begin(), reached.end()));
+  options.before_step = [](double factor) {
+    if (factor > 0.0) throw std::runtime_error("enough");
+  };
+  EXPECT_THROW(static_cast<void>(find_equilibrium(body, still, options)), std::runtime_error);
 }
 
 // The lower bone pushed along the arm through its own joint, and drawn to nine times its length: in both,
