@@ -113,32 +113,21 @@ SINEW_INLINE void forward_block(const Stored* values, ScalarOf<Stored>* t, int h
   }
 }
 
-/// t holds the solution in the rows below the block, and y in its own: solves for those.
+/// t holds the solution in the rows below the block, and y in its own: solves for those. Reads the block from
+/// its end to its begin, where the one that is read next ends.
 template <int W, class Stored>
 SINEW_INLINE void backward_block(const Stored* values, ScalarOf<Stored>* t, int height) {
   using Scalar = ScalarOf<Stored>;
-  const Head<W, Stored> head(values);
   Lanes<Stored> sums[W] = {};
-  const Stored* below = values + head_size<Stored>(W);
-  const int groups = groups_below<Stored>(W, height);
-  const std::ptrdiff_t size = head_size<Stored>(W) + std::ptrdiff_t{groups} * group_size<Stored>(W);
-  // Blocks are read in descending order and each of them ascending, which no processor foresees: fetches the
-  // block before while this one is read. It is a group longer at most.
-  const auto fetch = [&](const Stored* from, int count) {
-    constexpr int kLine = 64 / static_cast<int>(sizeof(Stored));
-    for (int i = 0; i < count; i += kLine) __builtin_prefetch(from + i);
-  };
-  fetch(values - size - group_size<Stored>(W), group_size<Stored>(W) + head_size<Stored>(W));
-  const auto add = [&](int g) {
+  int g = groups_below<Stored>(W, height);
+  const Stored* group = values + head_size<Stored>(W) + std::ptrdiff_t{g} * group_size<Stored>(W);
+  for (; g > 0; --g) {
+    group -= group_size<Stored>(W);
     Lanes<Stored> x;
-    load(t + W + g * kLanes<Stored>, x);
-    const Stored* group = below + std::ptrdiff_t{g} * group_size<Stored>(W);
-    fetch(group - size, group_size<Stored>(W));
+    load(t + W + (g - 1) * kLanes<Stored>, x);
     for_columns<W>(group, [&](int a, const Lanes<Stored>& l) { sums[a] += l * x; });
-  };
-  // The first group last: it holds what the block before has only just found.
-  for (int g = 1; g < groups; ++g) add(g);
-  if (groups > 0) add(0);
+  }
+  const Head<W, Stored> head(values);
   Scalar rest[W];
   for (int a = 0; a < W; ++a) {
     Scalar parts[kLanes<Stored>];
