@@ -1,9 +1,9 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "fem/detail/lanes.h"
+#include "fem/detail/large_pages.h"
 #include "fem/leaf_matrices.h"
 
 /// M, K and P of a body, packed for the one pass over all three that a step makes.
@@ -29,7 +29,7 @@ class Couples {
 
  private:
   /// Twelve numbers per entry: the three columns of K with M, P and nothing below them.
-  std::vector<double> values_;
+  LargeVector<double> values_;
 };
 
 }  // namespace sinew::fem::detail

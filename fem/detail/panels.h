@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fem/detail/lanes.h"
+#include "fem/detail/large_pages.h"
 
 /// The supernodes of a Cholesky factor as dense panels, packed in the order in which a solve reads them.
 namespace sinew::fem::detail {
@@ -79,7 +80,7 @@ class Panels {
 
   std::vector<Panel> panels_;
   std::vector<int> row_index_;
-  std::vector<Stored> values_;
+  LargeVector<Stored> values_;
   std::size_t num_values_ = 0, num_needed_values_ = 0;
   int work_size_ = 0;
   std::vector<std::vector<Subtree>> parts_;

@@ -6,6 +6,7 @@
 
 #include "fem/cell_matrices.h"
 #include "fem/detail/cell_groups.h"
+#include "fem/detail/large_pages.h"
 
 /// Products of every cell's stiffness with displacements in turned axes.
 namespace sinew::fem::detail {
@@ -46,7 +47,7 @@ class TurnedCells {
   void set(int cell, const CellStiffness& stiffness);
 
   CellGroups groups_;
-  std::vector<double> values_;  ///< group, block, row and column of the block, lane.
+  LargeVector<double> values_;  ///< group, block, row and column of the block, lane.
 };
 
 /// One row per corner of every cell, as CellGroups has vectors.
