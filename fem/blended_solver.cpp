@@ -138,12 +138,12 @@ struct BlendedSolver::Impl::StepData {
   Stage stage;
   double h, alpha, beta;
   Eigen::Vector3d gravity;
-  Points x_h, v_h, x_expected, v_expected;  ///< coefficients.
-  Rest rest;                                ///< at the stage.
+  const Points *x_h, *v_h, *x_expected, *v_expected;  ///< coefficients.
+  Rest rest;                                          ///< at the stage.
   struct Past {
     double share;
     const PosedFrames* pose;
-    Points x;  ///< coefficients.
+    const Points* x;  ///< coefficients.
     Rest rest;
   };
   std::vector<Past> past;
@@ -180,22 +180,22 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
     // A detail is a difference of positions: it turns with the region but does not travel.
     const double is_value = coordinates.is_value[static_cast<std::size_t>(f)] ? 1.0 : 0.0;
     const auto rest_of = [&](const Rest& rest) { return rest.of(*body, coordinates, region, f); };
-    const Eigen::Vector3d x_expected = step.x_expected.row(f).transpose();
+    const Eigen::Vector3d x_expected = step.x_expected->row(f).transpose();
     const Eigen::Vector3d p = to_local * (x_expected - is_value * end.origin);
     const Eigen::Vector3d u_end = p - rest_of(step.rest);
     Eigen::Vector3d u_past = Eigen::Vector3d::Zero(), carried = Eigen::Vector3d::Zero();
     for (std::size_t j = 0; j < step.past.size(); ++j) {
       const StepData::Past& past = step.past[j];
-      const Eigen::Vector3d x = past.x.row(f).transpose();
+      const Eigen::Vector3d x = past.x->row(f).transpose();
       u_past += past.share * (past_local[j] * (x - is_value * origin[j]) - rest_of(past.rest));
       carried += past.share * (from_past[j].linear() * x + is_value * from_past[j].translation());
     }
     // v+ - v_frame is the integrator's own difference of the flesh's place in the region: as exact as its
     // step.
-    const Eigen::Vector3d x_h = step.x_h.row(f).transpose();
+    const Eigen::Vector3d x_h = step.x_h->row(f).transpose();
     const Eigen::Vector3d v_frame = (carried - x_h) / (step.stage.kappa * step.h);
-    const Eigen::Vector3d inertia = step.v_h.row(f).transpose() + (th * step.alpha) * v_frame -
-                                    (1.0 + th * step.alpha) * step.v_expected.row(f).transpose();
+    const Eigen::Vector3d inertia = step.v_h->row(f).transpose() + (th * step.alpha) * v_frame -
+                                    (1.0 + th * step.alpha) * step.v_expected->row(f).transpose();
     coefficients[k] = {lanes(to_local * inertia), lanes(-th * ((1.0 + b) * u_end - b * u_past)),
                        lanes(-th * p)};
   }
@@ -251,7 +251,7 @@ void BlendedSolver::Impl::solve_region(RegionSystem& s, const StepData& step, co
   // Velocity of every local function in rotated axes, then at the region's vertices, back in the world,
   // weighted.
   for (std::size_t k = 0; k < s.functions.size(); ++k) {
-    s.velocity.row(static_cast<Eigen::Index>(k)) = step.v_expected.row(s.functions[k]) * end.rotation;
+    s.velocity.row(static_cast<Eigen::Index>(k)) = step.v_expected->row(s.functions[k]) * end.rotation;
   }
   s.velocity.topRows(s.num_unknown) += Eigen::Map<const Points>(s.solution.data(), s.num_unknown, 3);
   for (std::size_t k = 0; k < s.blended.size(); ++k) {
@@ -322,16 +322,21 @@ lattice::Points BlendedSolver::stage_velocity(const StageProblem& problem) {
       expected_velocity(body, *problem.state, x_h, problem.poses, problem.elapsed, eta_h);
   const Points x_expected = x_h + eta_h * v_expected;
   const Coordinates& coordinates = impl_->coordinates;
-  coordinates.analyse(x_h, step.x_h);
-  coordinates.analyse(*problem.v_h, step.v_h);
-  coordinates.analyse(x_expected, step.x_expected);
-  coordinates.analyse(v_expected, step.v_expected);
+  std::array<Points, 4 + kMostPast> analysed;
+  auto coefficients = [&, next = analysed.begin()](const Points& values) mutable -> const Points* {
+    if (coordinates.is_nodal()) return &values;
+    coordinates.analyse(values, *next);
+    return &*next++;
+  };
+  step.x_h = coefficients(x_h);
+  step.v_h = coefficients(*problem.v_h);
+  step.x_expected = coefficients(x_expected);
+  step.v_expected = coefficients(v_expected);
   step.rest = Rest(body, coordinates, *problem.poses.stage);
   assert(problem.past.size() <= kMostPast && "no integrator looks further back");
-  for (const PastPlace& place : problem.past) {
-    step.past.push_back({place.share, place.pose, {}, Rest(body, coordinates, *place.pose)});
-    coordinates.analyse(*place.x, step.past.back().x);
-  }
+  for (const PastPlace& place : problem.past)
+    step.past.push_back(
+        {place.share, place.pose, coefficients(*place.x), Rest(body, coordinates, *place.pose)});
 
   const std::vector<Factor>& factors = impl_->factors.at({h, problem.integrator});
   std::vector<RegionSystem>& systems = impl_->systems;

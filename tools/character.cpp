@@ -381,9 +381,6 @@ fem::SimulationOptions simulation_options(const Scene& scene) {
   options.integrator = scene.integrator;
   options.model = scene.model;
   options.solver.precision = scene.precision;
-  // On uniform levels the hats of the finest level span the same space as the hierarchical basis with fewer
-  // couplings: a step takes a sixth less. Local refinement will need the hierarchical one.
-  options.solver.basis = fem::Basis::Nodal;
   options.gravity = scene.gravity;
   options.settle_limit = scene.settle;
   if (scene.plain) {

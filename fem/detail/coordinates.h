@@ -20,6 +20,8 @@ struct Coordinates {
 
   int num_functions() const { return static_cast<int>(vertex.size()); }
 
+  /// Coefficients are the values of all leaf vertices.
+  bool is_nodal() const { return parents.empty() && num_functions() == values.rows(); }
   /// Coefficients of the functions from vertex values.
   void analyse(const lattice::Points& from, lattice::Points& to) const;
 };

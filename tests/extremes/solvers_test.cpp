@@ -116,12 +116,12 @@ TEST(Extremes, X30ChoicesOfTheSolverGiveOneAnswer) {
     if (!setting.empty()) table.add(setting, "blended", result);
     return result.x;
   };
-  fem::SolverOptions nodal, single, half;
-  nodal.basis = fem::Basis::Nodal;
+  fem::SolverOptions hierarchical, single, half;
+  hierarchical.basis = fem::Basis::Hierarchical;
   single.precision = fem::Precision::Float;
   half.precision = fem::Precision::Short;
-  const Points of_nodal = run("nodal basis", nodal);
-  table.at_most("off the default", distance(of_nodal, run("", {})), 1e-9);
+  const Points of_hierarchical = run("hierarchical basis", hierarchical);
+  table.at_most("off the default", distance(of_hierarchical, run("", {})), 1e-9);
   const Points in_double =
       run_extreme({body, motion, extreme_options("blended", kFrame, {0.0, -9.81, 0.0}), 30}).x;
   const Points of_float = run("float factors", single);
