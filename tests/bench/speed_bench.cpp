@@ -11,6 +11,7 @@
 #include <ctime>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -112,16 +113,12 @@ void print_frames() {
   for (const std::string& row : rows) fmt::print("{}\n", row);
 }
 
-const char* name_of(fem::Precision precision) {
-  switch (precision) {
-    case fem::Precision::Float:
-      return "float";
-    case fem::Precision::Short:
-      return "short";
-    default:
-      return "double";
-  }
-}
+/// What takes the steps.
+struct Stepper {
+  std::string model;
+  std::optional<fem::Precision> precision = {};  ///< left out: the model's own.
+  Integrator integrator = Integrator::Bdf2;
+};
 
 struct Steps {
   double median_ms = 0.0;    ///< of the fastest run.
@@ -130,14 +127,15 @@ struct Steps {
   fem::SolverCounts counts;
 };
 
-/// `count` steps of 1/120 s by BDF2; the first three, which factor and start, are not timed.
-Steps take_steps_once(const fem::Body& body, const fem::Motion& motion, const std::string& model,
-                      fem::Precision precision, int threads, int count) {
+/// `count` steps of 1/120 s; the first three, which factor and start, are not timed.
+Steps take_steps_once(const fem::Body& body, const fem::Motion& motion, const Stepper& by, int threads,
+                      int count) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(threads));
   fem::SimulationOptions options;
-  options.model = model;
-  options.solver.precision = precision;
+  options.model = by.model;
+  options.solver.precision = by.precision;
+  options.integrator = by.integrator;
   fem::Simulation simulation(body, motion, 0.0, options);
   Steps result;
   std::vector<double> times;
@@ -154,40 +152,41 @@ Steps take_steps_once(const fem::Body& body, const fem::Motion& motion, const st
   return result;
 }
 
-Steps take_steps(const fem::Body& body, const fem::Motion& motion, const std::string& model,
-                 fem::Precision precision, int threads, int count) {
-  fmt::print(stderr, "{} vertices: {}, {}, {} threads\n", body.mesh.num_vertices(), model, name_of(precision),
-             threads);
-  Steps best = take_steps_once(body, motion, model, precision, threads, count);
+Steps take_steps(const fem::Body& body, const fem::Motion& motion, const Stepper& by, int threads,
+                 int count) {
+  fmt::print(stderr, "{} vertices: {}, {} threads\n", body.mesh.num_vertices(), by.model, threads);
+  Steps best = take_steps_once(body, motion, by, threads, count);
   for (int run = 1; run < kRuns; ++run)
-    best.median_ms =
-        std::min(best.median_ms, take_steps_once(body, motion, model, precision, threads, count).median_ms);
+    best.median_ms = std::min(best.median_ms, take_steps_once(body, motion, by, threads, count).median_ms);
   return best;
 }
 
 /// What a column of the second table says, from the top.
 std::vector<std::string> step_column(const fem::Body& body, const fem::Motion& motion, int count) {
   using fem::Precision;
-  const auto timed = [&](const std::string& model, Precision precision, std::string& both) {
-    const Steps one = take_steps(body, motion, model, precision, 1, count),
-                two = take_steps(body, motion, model, precision, 2, count);
-    if (one.x != two.x) throw std::runtime_error(model + ": the bits depend on the number of threads");
+  const auto timed = [&](const Stepper& by, std::string& both) {
+    const Steps one = take_steps(body, motion, by, 1, count), two = take_steps(body, motion, by, 2, count);
+    if (one.x != two.x) throw std::runtime_error(by.model + ": the bits depend on the number of threads");
     both = tests::short_number(one.median_ms) + " / " + tests::short_number(two.median_ms);
     return one;
   };
-  std::string in_double, in_float, in_short, corotational;
-  const Steps exact = timed("blended", Precision::Double, in_double),
-              in_24 = timed("blended", Precision::Float, in_float),
-              in_16 = timed("blended", Precision::Short, in_short),
-              turned = timed("corotational", Precision::Double, corotational);
+  std::string in_double, in_float, in_short, by_bdf2, by_tr_bdf2;
+  const Steps exact = timed({"blended", Precision::Double}, in_double),
+              in_24 = timed({"blended", Precision::Float}, in_float),
+              in_16 = timed({"blended", Precision::Short}, in_short),
+              turned = timed({"corotational"}, by_bdf2),
+              twice = timed({"corotational", {}, Integrator::TrBdf2}, by_tr_bdf2);
   const auto off = [&](const Steps& rounded) {
     double largest = 0.0;
     for (std::size_t k = 0; k < exact.skin.size(); ++k)
       largest = std::max(largest, (exact.skin[k] - rounded.skin[k]).rowwise().norm().maxCoeff());
     return fmt::format("{:.0e}", largest);
   };
-  const auto share = [&](const Steps& steps) {
-    return fmt::format("{:.2f}", steps.median_ms / turned.median_ms);
+  const auto shares_of = [&](const Steps& dearer) {
+    std::string shares;
+    for (const Steps* steps : {&exact, &in_24, &in_16})
+      shares += (shares.empty() ? "" : " / ") + fmt::format("{:.2f}", steps->median_ms / dearer.median_ms);
+    return shares;
   };
   const std::vector<int>& unknowns = exact.counts.unknowns;
   return {fmt::format("{}", exact.counts.regions),
@@ -197,15 +196,18 @@ std::vector<std::string> step_column(const fem::Body& body, const fem::Motion& m
           in_float,
           in_short,
           off(in_24) + " / " + off(in_16),
-          corotational,
-          share(exact) + " / " + share(in_24) + " / " + share(in_16)};
+          by_bdf2,
+          shares_of(turned),
+          by_tr_bdf2,
+          shares_of(twice)};
 }
 
 void print_steps(int largest) {
   std::vector<std::vector<std::string>> columns{
       {"regions", "unknowns of all regions", "entries of their factors", "`blended`, double",
        "`blended`, float", "`blended`, short", "float / short from double, of the length", "`corotational`",
-       "double / float / short over it, 1 thread"}};
+       "`blended` over it, double / float / short, 1 thread", "`corotational` by `tr-bdf2`",
+       "`blended` by `bdf2` over it, double / float / short, 1 thread"}};
   std::string head = "| ms per step of 1/120 s, 1 / 2 threads |", rule = "|---|";
   const auto add = [&](const char* name, const fem::Body& body, const fem::Motion& motion, int count) {
     if (body.mesh.num_vertices() > largest) return;
