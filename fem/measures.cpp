@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -32,39 +33,63 @@ double stretch_strain(const Eigen::Matrix3d& gradient) {
   return (stretches.array() - 1.0).abs().maxCoeff();
 }
 
+/// A Gauss point of a cell.
+struct PointMeasure {
+  int index = 0;
+  double rest_det = 0.0;      ///< of the rest Jacobian [m^3].
+  Eigen::Matrix3d from_rest;  ///< dx/dX.
+  Eigen::Matrix3d growth;     ///< of the shape that is free of strain, from the rest shape.
+};
+
+/// Calls use(PointMeasure) at the cell's Gauss points; `grown`: null where nothing grows.
+template <class Use>
+void for_gauss_points(const Body& body, std::size_t c, const lattice::Points& x, const lattice::Points* grown,
+                      const Use& use) {
+  const lattice::HexCorners rest = lattice::hex_corners(body.mesh.points, body.mesh.cells[c]);
+  const lattice::HexCorners posed = lattice::hex_corners(x, body.mesh.cells[c]);
+  for (int q = 0; q < 8; ++q) {
+    const lattice::HexGradients gradients = lattice::trilinear_gradients(gauss_point(q));
+    const Eigen::Matrix3d rest_jacobian = rest.transpose() * gradients, to_rest = rest_jacobian.inverse();
+    Eigen::Matrix3d growth = Eigen::Matrix3d::Identity();
+    if (grown != nullptr)
+      growth = lattice::hex_corners(*grown, body.mesh.cells[c]).transpose() * gradients * to_rest;
+    use(PointMeasure{q, rest_jacobian.determinant(), posed.transpose() * gradients * to_rest, growth});
+  }
+}
+
 /// Elastic energy by the formula behind cell_stiffness, from the gradients themselves: the linear strain of
 /// R^T F at the Gauss points, with the mean dilatation.
+class CellEnergySum {
+ public:
+  void add(const PointMeasure& at, double fill, const Eigen::Matrix3d& rotation, double mu) {
+    const Eigen::Matrix3d turned = rotation.transpose() * at.from_rest;
+    const Eigen::Matrix3d strain =
+        0.5 * (turned + turned.transpose()) - 0.5 * (at.growth + at.growth.transpose());
+    const double weight = at.rest_det / 8.0 * (fill + kEmptyShare * (1.0 - fill));
+    const double trace = strain.trace();
+    shear_ += weight * mu * (strain.squaredNorm() - trace * trace / 3.0);
+    volume_ += weight;
+    dilatation_ += weight * trace;
+  }
+  double energy(double bulk) const { return shear_ + 0.5 * bulk * dilatation_ * dilatation_ / volume_; }
+
+ private:
+  double shear_ = 0.0, volume_ = 0.0, dilatation_ = 0.0;
+};
+
 CellMeasure measure_cell(const Body& body, std::size_t c, const lattice::Points& x,
                          const Eigen::Matrix3d& rotation, const lattice::Points* grown) {
   CellMeasure out;
-  const lattice::HexCorners rest = lattice::hex_corners(body.mesh.points, body.mesh.cells[c]);
-  const lattice::HexCorners posed = lattice::hex_corners(x, body.mesh.cells[c]);
-  const Material& material = body.materials[c];
-  double volume = 0.0, dilatation = 0.0;
-  for (int q = 0; q < 8; ++q) {
-    const lattice::HexGradients gradients = lattice::trilinear_gradients(gauss_point(q));
-    const Eigen::Matrix3d rest_jacobian = rest.transpose() * gradients;
-    const Eigen::Matrix3d from_rest = posed.transpose() * gradients * rest_jacobian.inverse();
-    Eigen::Matrix3d growth = Eigen::Matrix3d::Identity(),
-                    gradient = from_rest;  // F, from what is free of strain
-    if (grown != nullptr) {
-      growth =
-          lattice::hex_corners(*grown, body.mesh.cells[c]).transpose() * gradients * rest_jacobian.inverse();
-      gradient = from_rest * growth.inverse();
-    }
+  CellEnergySum sum;
+  for_gauss_points(body, c, x, grown, [&](const PointMeasure& at) {
+    Eigen::Matrix3d gradient = at.from_rest;  // F, from what is free of strain
+    if (grown != nullptr) gradient *= at.growth.inverse();
     out.det = std::min(out.det, gradient.determinant());
-    const double fill = body.fill[c][static_cast<std::size_t>(q)];
-    if (fill >= 0.5)
-      out.strain = std::max(out.strain, stretch_strain(gradient));  // else hardly any flesh to strain
-    const Eigen::Matrix3d turned = rotation.transpose() * from_rest;
-    const Eigen::Matrix3d strain = 0.5 * (turned + turned.transpose()) - 0.5 * (growth + growth.transpose());
-    const double weight = rest_jacobian.determinant() / 8.0 * (fill + kEmptyShare * (1.0 - fill));
-    const double trace = strain.trace();
-    out.energy += weight * material.mu() * (strain.squaredNorm() - trace * trace / 3.0);
-    volume += weight;
-    dilatation += weight * trace;
-  }
-  out.energy += 0.5 * material.bulk() * dilatation * dilatation / volume;
+    const double fill = body.fill[c][static_cast<std::size_t>(at.index)];
+    if (fill >= kFleshy) out.strain = std::max(out.strain, stretch_strain(gradient));
+    sum.add(at, fill, rotation, body.materials[c].mu());
+  });
+  out.energy = sum.energy(body.materials[c].bulk());
   return out;
 }
 
@@ -89,6 +114,16 @@ double tie_energy(const Body& body, const lattice::Points& x, const PosedFrames&
   return energy;
 }
 
+/// -m g . x, relative to the rest pose's.
+double potential_energy(const Body& body, const lattice::Points& x, const Eigen::Vector3d& gravity) {
+  double energy = 0.0;
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    energy -= body.vertex_mass[static_cast<std::size_t>(a)] *
+              gravity.dot((x.row(a) - body.mesh.points.row(a)).transpose());
+  }
+  return energy;
+}
+
 /// Weight-blended rotation of a cell's frames.
 Eigen::Matrix3d cell_rotation(const Body& body, std::size_t c, const PosedFrames& posed) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
@@ -101,6 +136,28 @@ Eigen::Matrix3d cell_rotation(const Body& body, std::size_t c, const PosedFrames
 }
 
 }  // namespace
+
+double kinetic_energy(const Body& body, const lattice::Points& v) {
+  return 0.5 * v.cwiseProduct(apply_mass(body.matrices, v)).sum();
+}
+
+double stored_energy(const Body& body, const lattice::Points& x, const PosedFrames& posed,
+                     const Eigen::Vector3d& gravity) {
+  std::optional<Growth> grown;
+  if (body.grows) grown = growth(body, posed);
+  std::vector<double> cells(body.mesh.cells.size());
+  tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t c) {
+    CellEnergySum sum;
+    const Eigen::Matrix3d rotation = cell_rotation(body, c, posed);
+    for_gauss_points(body, c, x, grown ? &grown->shape : nullptr, [&](const PointMeasure& at) {
+      sum.add(at, body.fill[c][static_cast<std::size_t>(at.index)], rotation, body.materials[c].mu());
+    });
+    cells[c] = sum.energy(body.materials[c].bulk());
+  });
+  double energy = std::accumulate(cells.begin(), cells.end(), potential_energy(body, x, gravity));
+  if (!body.ties.empty()) energy += tie_energy(body, x, posed, grown ? &*grown : nullptr);
+  return energy;
+}
 
 Measures measure(const Body& body, const lattice::Points& x, const lattice::Points& v,
                  const PosedFrames& posed, const Eigen::Vector3d& gravity) {
@@ -122,12 +179,9 @@ Measures measure(const Body& body, const lattice::Points& x, const lattice::Poin
     if (cells[c].det <= 0.0) ++m.inverted_cells;
   }
   if (!body.ties.empty()) m.ties = tie_energy(body, x, posed, grown ? &*grown : nullptr);
-  m.kinetic = 0.5 * v.cwiseProduct(apply_mass(body.matrices, v)).sum();
-  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
-    m.potential -= body.vertex_mass[static_cast<std::size_t>(a)] *
-                   gravity.dot((x.row(a) - body.mesh.points.row(a)).transpose());
-    m.largest_speed = std::max(m.largest_speed, v.row(a).norm());
-  }
+  m.kinetic = kinetic_energy(body, v);
+  m.potential = potential_energy(body, x, gravity);
+  m.largest_speed = v.rows() > 0 ? v.rowwise().norm().maxCoeff() : 0.0;
   for (const BoneVertex& bone : body.bones.vertices) {
     const double distance = (x.row(bone.vertex).transpose() - bone_position(bone, posed.joints)).norm();
     m.bone_residual = std::max(m.bone_residual, distance);

@@ -21,6 +21,13 @@ struct Measures {
   int inverted_cells = 0;  ///< leaf cells with det F <= 0 at a Gauss point.
 };
 
+/// 1/2 v^T M v [J]; v: num_vertices x 3 [m/s].
+double kinetic_energy(const Body& body, const lattice::Points& v);
+
+/// Elastic energy, ties and potential as Measures has them, together [J].
+double stored_energy(const Body& body, const lattice::Points& x, const PosedFrames& posed,
+                     const Eigen::Vector3d& gravity);
+
 /// x and v: leaf vertices, num_vertices x 3.
 Measures measure(const Body& body, const lattice::Points& x, const lattice::Points& v,
                  const PosedFrames& posed, const Eigen::Vector3d& gravity);

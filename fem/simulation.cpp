@@ -67,6 +67,7 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
         "integrator: implicit-midpoint damps nothing, and corotational turns its cells ahead of the step, "
         "which feeds energy in; hint: tr-bdf2, or --model neo-hookean");
   }
+  if (model_->may_gain_energy()) energy_cap_.emplace(body, options_.gravity);
   longest_ = options_.step;
   now_ = pose_at(start_time);
   past_ = now_;
@@ -428,6 +429,10 @@ SimulationReport Simulation::step_once(double h) {
       break;
   }
   if (!solve.ok()) return failed(solve);
+  if (energy_cap_) {
+    const bool pushed = !options_.loads.empty() || options_.force;
+    energy_cap_->limit(state_, now_, next, pushed ? &force_ : nullptr, after);
+  }
   if (options_.integrator == Integrator::Bdf2) track_.pass(state_, longest_);
   before_ = state_;
   after.x_past = state_.x;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "fem/energy_cap.h"
 #include "fem/loads.h"
 #include "fem/measures.h"
 #include "fem/models/model.h"
@@ -128,7 +129,8 @@ class Simulation {
   PosedFrames now_, past_;   ///< their poses.
   bool has_before_ = false;  ///< past_ is one real step earlier.
   double last_h_ = 0.0;
-  Track track_;           ///< of BDF2.
+  Track track_;  ///< of BDF2.
+  std::optional<EnergyCap> energy_cap_;
   double longest_ = 0.0;  ///< whole step so far [s].
   /// Where TR-BDF2 broke its last step.
   struct StepEnd {

@@ -85,6 +85,8 @@ class Blended final : public Model {
 
   bool linear_in_frames() const override { return true; }
 
+  bool may_gain_energy() const override { return body_.regions.size() > 1; }
+
   SolverCounts counts() const override { return solver_.counts(); }
 
  private:

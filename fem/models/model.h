@@ -69,6 +69,9 @@ class Model {
   /// The law is linear in the rotations of the cells' frames, as fem/measures.h has it.
   virtual bool linear_in_frames() const { return false; }
 
+  /// Its steps may give the flesh energy that nothing put in.
+  virtual bool may_gain_energy() const { return false; }
+
   virtual SolverCounts counts() const = 0;
 };
 

@@ -78,13 +78,15 @@ void write_summary() {
 /// The energy of flesh whose bones stand still, from step to step.
 class HeldEnergy {
  public:
+  /// Flesh is let go as it is, before the first step that is seen.
+  void let_go(const fem::Measures& m) { first_ = energy_of(m); }
   /// `noise`: what rounding may make of it [J].
   void see(const fem::Measures& m, double noise) {
-    const double energy = m.kinetic + m.elastic + m.potential + m.ties;
+    const double energy = energy_of(m);
     noise_ = std::max(noise_, noise);
-    if (++count_ == 1) first_ = most_ = least_ = energy;
+    if (++count_ == 1) most_ = least_ = energy;
     // The first step of BDF2 is carried on past its stage: what it ends with is what there is to lose.
-    if (count_ == 2) first_ = std::max(first_, energy);
+    if (count_ == 1) first_ = std::max(first_, energy);
     most_ = std::max(most_, energy);
     least_ = std::min(least_, energy);
     rise_ = std::max(rise_, energy - least_);
@@ -94,10 +96,12 @@ class HeldEnergy {
   double rise() const { return share(rise_); }
 
  private:
+  static double energy_of(const fem::Measures& m) { return m.kinetic + m.elastic + m.potential + m.ties; }
   double share(double energy) const { return energy > noise_ ? (energy - noise_) / scale_ : 0.0; }
 
   int count_ = 0;
-  double first_ = 0.0, most_ = 0.0, least_ = 0.0, rise_ = 0.0, scale_ = 0.0, noise_ = 0.0;
+  double first_ = -std::numeric_limits<double>::infinity();
+  double most_ = 0.0, least_ = 0.0, rise_ = 0.0, scale_ = 0.0, noise_ = 0.0;
 };
 
 }  // namespace
@@ -141,6 +145,7 @@ Extreme run_extreme(Simulation& simulation, double step, int steps, double held_
   const std::clock_t start = std::clock();
   const double begin = simulation.state().time;
   HeldEnergy held;
+  if (begin >= held_from) held.let_go(simulation.measures_at(begin));
   for (int k = 1; k <= steps; ++k) {
     // To the end of the k-th step, whatever its parts, and not by rounding to the next one's.
     const fem::SimulationReport report = simulation.advance_to(begin + (k - 1e-3) * step);

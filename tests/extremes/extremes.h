@@ -65,9 +65,8 @@ struct Extreme {
   double elastic = 0.0;  ///< the largest of all steps [J].
   double early = 0.0;    ///< largest kinetic energy in the first quarter of the steps [J].
   double late = 0.0;     ///< and in the last [J].
-                         /// By how much the energy rose over that of the first two states in which the bones
-                         /// stood still, over the
-  /// largest kinetic or stored energy since [-].
+  /// By how much the energy rose over that with which the flesh was let go, or which it had after the first
+  /// step on, over the largest kinetic or stored energy since [-].
   double growth = 0.0;
   double rise = 0.0;     ///< and over the least energy before, in the same measure [-].
   int inverted = 0;      ///< cells at the end.

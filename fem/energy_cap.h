@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+
+#include "fem/body.h"
+#include "fem/state.h"
+
+/// Energy that a model makes out of nothing, and how it is taken out again.
+namespace sinew::fem {
+
+/// Blending the answers of several regions is not passive: their blend may push where neither region would,
+/// and lightly damped flesh of a bent limb then gains energy that nothing put in. While the bones stand still
+/// the flesh can have no more than it had when they stopped and what forces have done since: a passivity
+/// observer and controller ([Hannaford02]) over whole steps.
+class EnergyCap {
+ public:
+  /// `body` must outlive the cap.
+  EnergyCap(const Body& body, const Eigen::Vector3d& gravity) : body_(body), gravity_(gravity) {}
+
+  /// Limits what a step ends with: `before` at the pose `now`, `after` at the pose `next`; `force`: of the
+  /// step, num_vertices x 3 [N], null for none. Takes the excess from the velocity; where that has less,
+  /// flesh without velocity stops on its way where its stored energy reaches the cap. Does nothing, and costs
+  /// next to nothing, where a bone moves.
+  void limit(const State& before, const PosedFrames& now, const PosedFrames& next,
+             const lattice::Points* force, State& after);
+
+ private:
+  const Body& body_;
+  Eigen::Vector3d gravity_;
+  std::optional<double> cap_;  ///< empty while bones move [J].
+};
+
+}  // namespace sinew::fem
