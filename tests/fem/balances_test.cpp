@@ -72,7 +72,6 @@ TEST(Momentum, OfAFreeBodyGrowsByItsWeightAlone) {
   for (const ModelInfo& info : models()) {
     if (!info.dynamic) continue;
     for (Integrator integrator : kIntegrators) {
-      if (info.name == "corotational" && integrator == Integrator::ImplicitMidpoint) continue;  // refused
       SimulationOptions options = options_of(std::string(info.name), integrator, 1.0 / 120.0);
       options.gravity = {0.0, -9.81, 2.0};
       Simulation simulation(body, still, 0.0, options);
@@ -93,7 +92,7 @@ TEST(Momentum, OfAFreeBodyGrowsByItsWeightAlone) {
 // angular momentum stays, whatever the law does. Backward Euler and BDF2 lose some.
 TEST(AngularMomentum, IsKeptByTheMidpointRuleAndLostByTheOthers) {
   const Body body = block(2e4, false);
-  for (const std::string model : {"stvk", "neo-hookean"}) {
+  for (const std::string model : {"corotational", "stvk", "neo-hookean"}) {
     for (Integrator integrator : kIntegrators) {
       Simulation simulation(body, still, 0.0, options_of(model, integrator, 1.0 / 60.0));
       simulation.set_velocity(lively(body, 6.0));
@@ -141,6 +140,9 @@ TEST(FreeSpin, IsLostByBackwardEulerAsTheClosedFormSaysAndKeptByTheOthers) {
     EXPECT_NEAR(off(Integrator::BackwardEuler, angle), 0.0, 2e-3 * angle) << model;
     EXPECT_NEAR(off(Integrator::Bdf2, 2.0 * M_PI), -0.09, 0.02) << model;
     EXPECT_NEAR(off(Integrator::TrBdf2, 2.0 * M_PI), 0.035, 0.025) << model;
+    // Half way through a step the block is itself, and its angular momentum stays: half a step's angle has
+    // the tangent w h / 2. It is 0.015 rad behind, as it starts off that circle and nothing damps it back.
+    EXPECT_NEAR(off(Integrator::ImplicitMidpoint, 120.0 * std::atan(0.5 * w * h)), 0.0, 0.02) << model;
   }
 }
 
