@@ -28,8 +28,9 @@ class Couples {
                         Code code = best_code()) const;
 
  private:
-  /// Twelve numbers per entry: the three columns of K with M, P and nothing below them.
+  /// Ten numbers per entry: the three columns of K, then M.
   LargeVector<double> values_;
+  LargeVector<double> ties_;  ///< P; empty where no entry has any.
 };
 
 }  // namespace sinew::fem::detail

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace sinew::fem::detail {
@@ -55,12 +56,13 @@ void PackedFactor::solve(Eigen::Ref<Eigen::VectorXd> b, Eigen::VectorXd& workspa
   // Norm one: a small right-hand side must not fall among float's denormals.
   double norm = 0.0;
   for (Eigen::Index i = 0; i < n; ++i) norm = std::max(norm, std::abs(scale_[i] * b[i]));
-  if (norm == 0.0) return b.setZero(), void();
+  if (norm < std::numeric_limits<double>::min()) return b.setZero(), void();
+  const double unit = 1.0 / norm;
   const auto in_float = [&](const auto& panels) {
     Eigen::VectorXf x(n + panels.work_size());
-    for (Eigen::Index i = 0; i < n; ++i) x[i] = static_cast<float>(scale_[row(i)] * b[row(i)] / norm);
+    for (Eigen::Index i = 0; i < n; ++i) x[i] = static_cast<float>(scale_[row(i)] * (b[row(i)] * unit));
     panels.solve(x.data(), x.data() + n);
-    for (Eigen::Index i = 0; i < n; ++i) b[row(i)] = scale_[row(i)] * norm * static_cast<double>(x[i]);
+    for (Eigen::Index i = 0; i < n; ++i) b[row(i)] = scale_[row(i)] * (norm * static_cast<double>(x[i]));
   };
   if (const auto* panels = std::get_if<Panels<float>>(&panels_)) in_float(*panels);
   if (const auto* panels = std::get_if<Panels<Pair>>(&panels_)) in_float(*panels);
