@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fem/measures.h"
-
 namespace sinew::fem {
 namespace {
 
@@ -26,23 +24,25 @@ bool stand_still(const Body& body, const PosedFrames& now, const PosedFrames& ne
 void EnergyCap::limit(const State& before, const PosedFrames& now, const PosedFrames& next,
                       const lattice::Points* force, State& after) {
   if (!stand_still(body_, now, next)) {
-    cap_.reset();
+    stored_.reset();
     return;
   }
-  if (!cap_) cap_ = kinetic_energy(body_, before.v) + stored_energy(body_, before.x, next, gravity_);
-  if (force != nullptr) *cap_ += force->cwiseProduct(after.x - before.x).sum();
+  if (!stored_) {
+    stored_.emplace(body_, next, gravity_);
+    cap_ = kinetic_energy(body_, before.v) + stored_->of(before.x);
+  }
+  if (force != nullptr) cap_ += force->cwiseProduct(after.x - before.x).sum();
 
-  const double kinetic = kinetic_energy(body_, after.v),
-               stored = stored_energy(body_, after.x, next, gravity_);
-  if (kinetic + stored <= *cap_) return;
-  if (stored <= *cap_) {
-    after.v *= std::sqrt((*cap_ - stored) / kinetic);
+  const double kinetic = kinetic_energy(body_, after.v), stored = stored_->of(after.x);
+  if (kinetic + stored <= cap_) return;
+  if (stored <= cap_) {
+    after.v *= std::sqrt((cap_ - stored) / kinetic);
     return;
   }
   // Stored energy is convex in the places of flesh in one pose, so that on the line between two places it is
   // at most what lies on the line between their energies.
-  const double begin = stored_energy(body_, before.x, next, gravity_);
-  const double share = std::clamp((*cap_ - begin) / (stored - begin), 0.0, 1.0);
+  const double begin = stored_->of(before.x);
+  const double share = std::clamp((cap_ - begin) / (stored - begin), 0.0, 1.0);
   after.x = before.x + share * (after.x - before.x);
   after.v.setZero();
 }

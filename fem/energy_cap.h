@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "fem/body.h"
+#include "fem/measures.h"
 #include "fem/state.h"
 
 /// Energy that a model makes out of nothing, and how it is taken out again.
@@ -27,7 +27,8 @@ class EnergyCap {
  private:
   const Body& body_;
   Eigen::Vector3d gravity_;
-  std::optional<double> cap_;  ///< empty while bones move [J].
+  std::optional<StoredEnergy> stored_;  ///< in the pose of bones that stand still; empty while they move.
+  double cap_ = 0.0;                    ///< [J].
 };
 
 }  // namespace sinew::fem

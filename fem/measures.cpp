@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
-#include <optional>
-#include <vector>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
-
-#include "fem/growth.h"
 
 namespace sinew::fem {
 namespace {
@@ -141,21 +137,25 @@ double kinetic_energy(const Body& body, const lattice::Points& v) {
   return 0.5 * v.cwiseProduct(apply_mass(body.matrices, v)).sum();
 }
 
-double stored_energy(const Body& body, const lattice::Points& x, const PosedFrames& posed,
-                     const Eigen::Vector3d& gravity) {
-  std::optional<Growth> grown;
-  if (body.grows) grown = growth(body, posed);
-  std::vector<double> cells(body.mesh.cells.size());
+StoredEnergy::StoredEnergy(const Body& body, const PosedFrames& posed, const Eigen::Vector3d& gravity)
+    : body_(&body), posed_(posed), gravity_(gravity), rotations_(body.mesh.cells.size()) {
+  if (body.grows) grown_ = growth(body, posed);
+  tbb::parallel_for(std::size_t{0}, rotations_.size(),
+                    [&](std::size_t c) { rotations_[c] = cell_rotation(body, c, posed); });
+}
+
+double StoredEnergy::of(const lattice::Points& x) const {
+  const Body& body = *body_;
+  std::vector<double> cells(rotations_.size());
   tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t c) {
     CellEnergySum sum;
-    const Eigen::Matrix3d rotation = cell_rotation(body, c, posed);
-    for_gauss_points(body, c, x, grown ? &grown->shape : nullptr, [&](const PointMeasure& at) {
-      sum.add(at, body.fill[c][static_cast<std::size_t>(at.index)], rotation, body.materials[c].mu());
+    for_gauss_points(body, c, x, grown_ ? &grown_->shape : nullptr, [&](const PointMeasure& at) {
+      sum.add(at, body.fill[c][static_cast<std::size_t>(at.index)], rotations_[c], body.materials[c].mu());
     });
     cells[c] = sum.energy(body.materials[c].bulk());
   });
-  double energy = std::accumulate(cells.begin(), cells.end(), potential_energy(body, x, gravity));
-  if (!body.ties.empty()) energy += tie_energy(body, x, posed, grown ? &*grown : nullptr);
+  double energy = std::accumulate(cells.begin(), cells.end(), potential_energy(body, x, gravity_));
+  if (!body.ties.empty()) energy += tie_energy(body, x, posed_, grown_ ? &*grown_ : nullptr);
   return energy;
 }
 

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "fem/body.h"
+#include "fem/growth.h"
 
 namespace sinew::fem {
 
@@ -24,9 +28,21 @@ struct Measures {
 /// 1/2 v^T M v [J]; v: num_vertices x 3 [m/s].
 double kinetic_energy(const Body& body, const lattice::Points& v);
 
-/// Elastic energy, ties and potential as Measures has them, together [J].
-double stored_energy(const Body& body, const lattice::Points& x, const PosedFrames& posed,
-                     const Eigen::Vector3d& gravity);
+/// Elastic energy, ties and potential as Measures has them, together, of any flesh in one pose.
+class StoredEnergy {
+ public:
+  /// `body` must outlive it.
+  StoredEnergy(const Body& body, const PosedFrames& posed, const Eigen::Vector3d& gravity);
+  /// x: leaf vertices, num_vertices x 3 [m]; the result in [J].
+  double of(const lattice::Points& x) const;
+
+ private:
+  const Body* body_;
+  PosedFrames posed_;
+  Eigen::Vector3d gravity_;
+  std::optional<Growth> grown_;
+  std::vector<Eigen::Matrix3d> rotations_;  ///< of the cells' frames.
+};
 
 /// x and v: leaf vertices, num_vertices x 3.
 Measures measure(const Body& body, const lattice::Points& x, const lattice::Points& v,

@@ -32,7 +32,7 @@ struct BentArm {
     place_bones(body, pose, off.x);
   }
   double energy(const State& state) const {
-    return kinetic_energy(body, state.v) + stored_energy(body, state.x, pose, kWeight);
+    return kinetic_energy(body, state.v) + StoredEnergy(body, pose, kWeight).of(state.x);
   }
 };
 
@@ -41,7 +41,7 @@ TEST(StoredEnergy, IsWhatAFrameReports) {
   const Measures m = measure(arm.body, arm.off.x, arm.off.v, arm.pose, kWeight);
   EXPECT_GT(m.ties, 0.0);
   // Sums of some thousand terms, in another order.
-  EXPECT_NEAR(stored_energy(arm.body, arm.off.x, arm.pose, kWeight), m.elastic + m.ties + m.potential,
+  EXPECT_NEAR(StoredEnergy(arm.body, arm.pose, kWeight).of(arm.off.x), m.elastic + m.ties + m.potential,
               1e-12 * (m.elastic + m.ties + std::abs(m.potential)));
 }
 
@@ -65,7 +65,7 @@ TEST(EnergyCap, StopsFleshOnItsWayWhereTheVelocityHasTooLittle) {
   before.v.setConstant(0.1);
   after.v.setConstant(0.1);
   const double most = arm.energy(before);
-  ASSERT_GT(stored_energy(arm.body, after.x, arm.pose, kWeight), most);
+  ASSERT_GT(StoredEnergy(arm.body, arm.pose, kWeight).of(after.x), most);
   cap.limit(before, arm.pose, arm.pose, nullptr, after);
   EXPECT_EQ(after.v.norm(), 0.0);
   EXPECT_LE(arm.energy(after), most * (1.0 + 1e-14));
