@@ -34,13 +34,21 @@ struct BlendedSolver::Impl {
   Coordinates coordinates;
   std::vector<RegionSystem> systems;
   detail::Couples couples;
-  /// Systems that have a leaf vertex among their rows: (system, row).
-  std::vector<std::vector<std::pair<int, int>>> rows_of_vertex;
+  /// A row of a system: where its neighbours and what is applied to them stand, and where the force goes.
+  struct Row {
+    const int* columns = nullptr;
+    const Inputs* inputs = nullptr;
+    double* force = nullptr;
+  };
+  /// Of vertex a from row_start[a] on: its matrices are read once for all systems that have it.
+  std::vector<Row> all_rows;
+  std::vector<int> row_start;
   std::map<std::pair<double, Integrator>, std::vector<Factor>> factors;
 
   struct StepData;
+  void collect_rows();
   void gather_inputs(RegionSystem& system, const StepData& step) const;
-  void apply_matrices(int vertex);
+  void apply_matrices(int vertex) const;
   void solve_region(RegionSystem& system, const StepData& step, const Factor& factor) const;
 };
 
@@ -51,14 +59,7 @@ BlendedSolver::BlendedSolver(const Body& body, const SolverOptions& options)
   impl_->coordinates = options.basis == Basis::Nodal ? detail::nodal_coordinates(body)
                                                      : detail::hierarchical_coordinates(body);
   impl_->systems = detail::region_systems(body, impl_->coordinates, options.rings);
-  impl_->rows_of_vertex.resize(static_cast<std::size_t>(body.mesh.num_vertices()));
-  for (std::size_t i = 0; i < impl_->systems.size(); ++i) {
-    const RegionSystem& system = impl_->systems[i];
-    for (int r = 0; r < system.num_rows; ++r) {
-      const int vertex = system.vertices[static_cast<std::size_t>(r)];
-      impl_->rows_of_vertex[static_cast<std::size_t>(vertex)].emplace_back(static_cast<int>(i), r);
-    }
-  }
+  impl_->collect_rows();
   impl_->couples = detail::Couples(body.matrices);
 }
 BlendedSolver::~BlendedSolver() = default;
@@ -212,15 +213,29 @@ void BlendedSolver::Impl::gather_inputs(RegionSystem& s, const StepData& step) c
   }
 }
 
-/// Rows of one leaf vertex in all systems that have it: the matrices are read once for all of them.
-void BlendedSolver::Impl::apply_matrices(int vertex) {
-  const auto first = static_cast<std::size_t>(body->matrices.row_start[static_cast<std::size_t>(vertex)]);
-  const auto count =
-      static_cast<std::size_t>(body->matrices.row_start[static_cast<std::size_t>(vertex) + 1]) - first;
-  for (const auto& [system, row] : rows_of_vertex[static_cast<std::size_t>(vertex)]) {
-    RegionSystem& s = systems[static_cast<std::size_t>(system)];
-    const int* columns = s.column.data() + s.row_start[static_cast<std::size_t>(row)];
-    s.row_force.row(row) = couples.apply(first, {columns, count}, s.inputs.data()).transpose();
+void BlendedSolver::Impl::collect_rows() {
+  std::vector<std::vector<Row>> of_vertex(static_cast<std::size_t>(body->mesh.num_vertices()));
+  for (RegionSystem& s : systems) {
+    for (int r = 0; r < s.num_rows; ++r) {
+      const auto i = static_cast<std::size_t>(r);
+      of_vertex[static_cast<std::size_t>(s.vertices[i])].push_back(
+          {s.column.data() + s.row_start[i], s.inputs.data(), s.row_force.row(r).data()});
+    }
+  }
+  row_start.assign(1, 0);
+  for (const std::vector<Row>& some : of_vertex) {
+    all_rows.insert(all_rows.end(), some.begin(), some.end());
+    row_start.push_back(static_cast<int>(all_rows.size()));
+  }
+}
+
+void BlendedSolver::Impl::apply_matrices(int vertex) const {
+  const auto a = static_cast<std::size_t>(vertex);
+  const auto first = static_cast<std::size_t>(body->matrices.row_start[a]),
+             count = static_cast<std::size_t>(body->matrices.row_start[a + 1]) - first;
+  for (auto r = static_cast<std::size_t>(row_start[a]); r < static_cast<std::size_t>(row_start[a + 1]); ++r) {
+    const Row& row = all_rows[r];
+    Eigen::Map<Eigen::Vector3d>(row.force) = couples.apply(first, {row.columns, count}, row.inputs);
   }
 }
 
