@@ -292,6 +292,10 @@ SolveReport RotatedModel::solve_polar(const Balance& balance, double h, double e
   // Of the first residual. At 0.01 a bar jerked by 1.14 lengths is left to Newton's method, which finds a
   // rest with cells inside out.
   constexpr double kGood = 0.1;
+  // Of the forces that are to balance: where the guess was far off, a tenth of what it left may be all of
+  // them. At 0.9 a bar drawn to a hundred lengths goes on inside out; at 0.1 the jerked bar is left to
+  // Newton's method.
+  constexpr double kBalanced = 0.5;
   constexpr int kRounds = 4;
   const std::vector<Rotations> past = past_rotations(balance);
   SolveReport total;
@@ -306,7 +310,7 @@ SolveReport RotatedModel::solve_polar(const Balance& balance, double h, double e
     if (round == 0) {
       first = left;
       enough = enough_for(h, residual);
-    } else if (left <= std::max(enough, kGood * first)) {
+    } else if (left <= std::max(enough, std::min(kGood * first, kBalanced * scale_))) {
       return total;
     } else if (round == kRounds || !(left <= (round == 1 ? 10.0 : 0.5) * last)) {
       break;
