@@ -86,6 +86,18 @@ TEST(EnergyCap, RemembersTheEnergyWithWhichTheBonesStopped) {
   EXPECT_NEAR(arm.energy(again), arm.energy(first), 1e-12 * arm.energy(first));
 }
 
+TEST(EnergyCap, ForgetsItWhereABoneMoves) {
+  const BentArm arm;
+  const PosedFrames earlier = pose_frames(arm.body.tree, tests::arm_pose(59.9 * tests::kDegree), 0.0);
+  EnergyCap cap(arm.body, kWeight);
+  State low = arm.at, again = arm.at;
+  cap.limit(arm.off, arm.pose, arm.pose, nullptr, low);  // much energy
+  cap.limit(low, earlier, arm.pose, nullptr, low);
+  again.v.setConstant(10.0);
+  cap.limit(low, arm.pose, arm.pose, nullptr, again);
+  EXPECT_NEAR(arm.energy(again), arm.energy(low), 1e-12 * arm.energy(arm.off));
+}
+
 TEST(EnergyCap, LeavesWhatForcesAndBonesPutIn) {
   const BentArm arm;
   State before = arm.at, after = arm.off;
