@@ -35,8 +35,10 @@ void EnergyCap::limit(const State& before, const PosedFrames& now, const PosedFr
 
   const double kinetic = kinetic_energy(body_, after.v), stored = stored_->of(after.x);
   if (kinetic + stored <= cap_) return;
+  ++taken_.steps;
   if (stored <= cap_) {
     after.v *= std::sqrt((cap_ - stored) / kinetic);
+    taken_.energy += kinetic + stored - cap_;
     return;
   }
   // Stored energy is convex in the places of flesh in one pose, so that on the line between two places it is
@@ -45,6 +47,7 @@ void EnergyCap::limit(const State& before, const PosedFrames& now, const PosedFr
   const double share = std::clamp((cap_ - begin) / (stored - begin), 0.0, 1.0);
   after.x = before.x + share * (after.x - before.x);
   after.v.setZero();
+  taken_.energy += kinetic + stored - stored_->of(after.x);
 }
 
 }  // namespace sinew::fem

@@ -14,6 +14,12 @@ namespace sinew::fem {
 /// observer and controller ([Hannaford02]) over whole steps.
 class EnergyCap {
  public:
+  /// What has been taken out so far.
+  struct Taken {
+    int steps = 0;        ///< that ended above the cap.
+    double energy = 0.0;  ///< [J].
+  };
+
   /// `body` must outlive the cap.
   EnergyCap(const Body& body, const Eigen::Vector3d& gravity) : body_(body), gravity_(gravity) {}
 
@@ -24,11 +30,14 @@ class EnergyCap {
   void limit(const State& before, const PosedFrames& now, const PosedFrames& next,
              const lattice::Points* force, State& after);
 
+  const Taken& taken() const { return taken_; }
+
  private:
   const Body& body_;
   Eigen::Vector3d gravity_;
   std::optional<StoredEnergy> stored_;  ///< in the pose of bones that stand still; empty while they move.
   double cap_ = 0.0;                    ///< [J].
+  Taken taken_;
 };
 
 }  // namespace sinew::fem

@@ -94,6 +94,8 @@ class Simulation {
   /// The embedded skin: rows of `positions`.
   lattice::Points skin_of(const lattice::Points& positions) const { return body_.skin.weights * positions; }
   SolverCounts counts() const { return model_->counts(); }
+  /// What blending made of energy while the bones stood still, and was taken out again.
+  EnergyCap::Taken energy_taken() const { return energy_cap_ ? energy_cap_->taken() : EnergyCap::Taken{}; }
 
  private:
   PosedFrames pose_at(double time) const;

@@ -100,6 +100,8 @@ std::string report_json(const RunReport& report, const Character& character, con
   json["seconds"] = times;
   json["settle"] = {{"steps", report.settle_steps}, {"speed_left_m_per_s", report.settle_speed}};
 
+  json["energy_cap"] = {{"steps", report.energy_taken.steps}, {"taken_J", report.energy_taken.energy}};
+
   double residual = 0.0, strain = 0.0, det = std::numeric_limits<double>::infinity();
   int inverted = 0, flipped = 0;
   Json frames = Json::array();

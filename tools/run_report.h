@@ -26,6 +26,7 @@ struct RunReport {
   int settle_steps = 0;
   double settle_speed = 0.0;  ///< left when settling ended [m/s].
   fem::SolverCounts counts;
+  fem::EnergyCap::Taken energy_taken;
   std::vector<FrameReport> frames;
 };
 

@@ -319,6 +319,7 @@ void simulate(const Scene& scene, const Talk& talk) {
   if (scene.preview == Switch::On) write_picture(character, preview, out.file(kPicture));
   lap("preview");
   report.counts = simulation.counts();
+  report.energy_taken = simulation.energy_taken();
   write_companions(scene, character, layout, report, body, frames, out);
   stop_if_interrupted("before the results were in place");
   out.commit();

@@ -50,9 +50,12 @@ TEST(EnergyCap, TakesWhatIsTooMuchFromTheVelocity) {
   EnergyCap cap(arm.body, kWeight);
   State before = arm.off, after = arm.at;
   after.v.setConstant(10.0);
-  ASSERT_GT(arm.energy(after), arm.energy(before));
+  const double wanted = arm.energy(after);
+  ASSERT_GT(wanted, arm.energy(before));
   cap.limit(before, arm.pose, arm.pose, nullptr, after);
   EXPECT_EQ(after.x, arm.at.x);
+  EXPECT_EQ(cap.taken().steps, 1);
+  EXPECT_NEAR(cap.taken().energy, wanted - arm.energy(after), 1e-12 * wanted);
   // The root of a ratio, squared again.
   EXPECT_NEAR(arm.energy(after), arm.energy(before), 1e-12 * arm.energy(before));
   EXPECT_NEAR(after.v.maxCoeff(), after.v.minCoeff(), 1e-15);  // in proportion
@@ -64,11 +67,12 @@ TEST(EnergyCap, StopsFleshOnItsWayWhereTheVelocityHasTooLittle) {
   State before = arm.at, after = arm.off;
   before.v.setConstant(0.1);
   after.v.setConstant(0.1);
-  const double most = arm.energy(before);
+  const double most = arm.energy(before), wanted = arm.energy(after);
   ASSERT_GT(StoredEnergy(arm.body, arm.pose, kWeight).of(after.x), most);
   cap.limit(before, arm.pose, arm.pose, nullptr, after);
   EXPECT_EQ(after.v.norm(), 0.0);
   EXPECT_LE(arm.energy(after), most * (1.0 + 1e-14));
+  EXPECT_NEAR(cap.taken().energy, wanted - arm.energy(after), 1e-12 * wanted);
   // On the way, neither at its begin nor at its end.
   EXPECT_GT((after.x - arm.at.x).norm(), 0.0);
   EXPECT_LT((after.x - arm.at.x).norm(), (arm.off.x - arm.at.x).norm());
@@ -81,6 +85,7 @@ TEST(EnergyCap, RemembersTheEnergyWithWhichTheBonesStopped) {
   State low = rest, again = arm.at;
   cap.limit(first, arm.pose, arm.pose, nullptr, low);  // falls below what it had
   EXPECT_EQ(low.x, rest.x);
+  EXPECT_EQ(cap.taken().steps, 0);
   again.v.setConstant(10.0);
   cap.limit(low, arm.pose, arm.pose, nullptr, again);  // and may come back to it
   EXPECT_NEAR(arm.energy(again), arm.energy(first), 1e-12 * arm.energy(first));

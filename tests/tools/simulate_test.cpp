@@ -68,6 +68,8 @@ TEST_F(Simulate, TakesAStepThatDoesNotDivideTheFrameTime) {
 TEST_F(Simulate, SettlesBeforeTheFirstFrameSoThatNothingPops) {
   const nlohmann::json report = simulate("arm", "settled", "--frames 0-2 --cells 200");
   EXPECT_LT(report["settle"]["speed_left_m_per_s"].get<double>(), 1e-3);
+  EXPECT_GE(report["energy_cap"]["steps"].get<int>(), 0);
+  EXPECT_GE(report["energy_cap"]["taken_J"].get<double>(), 0.0);
   const assets::Pc2Reader cache((out("settled") / "skin.pc2").string());
   // The arm's clip starts slowly: from frame to frame nothing may move more than a hundredth of its 0.67 m.
   EXPECT_LT((cache.read(1) - cache.read(0)).rowwise().norm().maxCoeff(), 0.0067F);
