@@ -9,6 +9,7 @@
 
 #include "fem/growth.h"
 #include "fem/mirror.h"
+#include "fem/phong_skin.h"
 
 namespace sinew::fem {
 namespace {
@@ -161,6 +162,8 @@ void BodyOptions::validate() const {
   require(damping.frequency > 0.0, "damping_frequency", damping.frequency, "a positive number of hertz");
   require(ties.stiffness >= 0.0, "twist stiffness", ties.stiffness, ">= 0");
   require(ties.radius > 0.0, "twist radius", ties.radius, "> 0");
+  require(ghost.strength >= 0.0, "ghost penalty", ghost.strength, ">= 0");
+  require(phong >= 0.0 && phong <= 1.0, "phong", phong, "0 to 1");
 }
 
 Material RegionMaterial::applied_to(Material material) const {
@@ -301,7 +304,7 @@ Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly)
   const std::vector<Material> of_frame = frame_materials(tree, options);
   std::vector<Material> materials = leaf_materials(input, options, hierarchy, mesh, weights, of_frame);
   LeafMatrices matrices;
-  if (assembly == Assembly::Done) matrices = assemble(mesh, materials, fill);
+  if (assembly == Assembly::Done) matrices = assemble(mesh, materials, fill, options.ghost);
   std::vector<double> mu_of_frame;
   for (const Material& m : of_frame) mu_of_frame.push_back(m.mu());
   const LimbRadii radii(input.lattice, tree, input.skin, h, whole ? &whole->map : nullptr);
@@ -332,9 +335,11 @@ Body make(const BodyInput& input, const BodyOptions& options, Assembly assembly)
             {},
             {},
             0.0,
-            0.0};
+            0.0,
+            {}};
   body.size = (body.mesh.points.colwise().maxCoeff() - body.mesh.points.colwise().minCoeff()).norm();
   if (assembly == Assembly::Left) return body;
+  body.skin_rows = phong_rows(body.mesh, body.fill, body.skin, input.skin, options.phong);
   if (body.grows) body.bone_extension = bone_extension(body.hierarchy, body.mesh, body.skin, body.bones);
   weigh(body);
   return body;

@@ -37,6 +37,9 @@ struct BodyOptions {
   Damping damping;
   TieOptions ties;
   RegionOptions regions;
+  GhostPenalty ghost;
+  /// Share s of the skin's smooth embedding (fem/phong_skin.h) [-]; 0 = trilinear.
+  double phong = 0.5;
   /// Open sheets have no inside: flesh reaches this share of the edge length from the skin [-].
   double shell = 0.03;
 
@@ -49,7 +52,7 @@ struct Body {
   lattice::ControlLattice lattice;
   lattice::Hierarchy hierarchy;
   lattice::LeafMesh mesh;
-  lattice::Embedding skin;                   ///< of surface.points.
+  lattice::Embedding skin;                   ///< of surface.points, trilinear.
   std::vector<lattice::FillFractions> fill;  ///< per leaf cell.
   std::vector<Material> materials;           ///< per leaf cell.
   LeafMatrices matrices;
@@ -65,6 +68,8 @@ struct Body {
   std::vector<double> vertex_mass;  ///< row sums of M [kg].
   double volume = 0.0;              ///< of the flesh [m^3].
   double size = 0.0;                ///< diagonal of the lattice's box [m].
+  /// How leaf values move the skin, num_points x num_vertices (fem/phong_skin.h).
+  Eigen::SparseMatrix<double, Eigen::RowMajor> skin_rows = {};
 };
 
 /// A plane of the rest shape on which every leaf vertex is held: a clamped end.

@@ -14,14 +14,20 @@ int LeafMatrices::entry(int row, int col) const {
 
 namespace {
 
-/// Vertices that share a leaf cell, each row ascending.
-void make_pattern(const lattice::LeafMesh& mesh, LeafMatrices& matrices) {
+/// Vertices that share a leaf cell or a face's penalty, each row ascending.
+void make_pattern(const lattice::LeafMesh& mesh, const std::vector<GhostMatrix>& ghosts,
+                  LeafMatrices& matrices) {
   const auto n = static_cast<std::size_t>(mesh.num_vertices());
   std::vector<std::vector<int>> neighbours(n);
   for (const auto& cell : mesh.cells) {
     for (int a : cell)
       neighbours[static_cast<std::size_t>(a)].insert(neighbours[static_cast<std::size_t>(a)].end(),
                                                      cell.begin(), cell.end());
+  }
+  for (const GhostMatrix& ghost : ghosts) {
+    for (const int a : ghost.vertices)
+      neighbours[static_cast<std::size_t>(a)].insert(neighbours[static_cast<std::size_t>(a)].end(),
+                                                     ghost.vertices.begin(), ghost.vertices.end());
   }
   matrices.row_start.assign(1, 0);
   for (auto& row : neighbours) {
@@ -84,9 +90,16 @@ Eigen::SparseMatrix<double> in_functions(const LeafMatrices& matrices, const lat
 }  // namespace
 
 LeafMatrices assemble(const lattice::LeafMesh& mesh, std::span<const Material> materials,
-                      std::span<const lattice::FillFractions> fill) {
+                      std::span<const lattice::FillFractions> fill, const GhostPenalty& penalty) {
+  std::vector<GhostMatrix> ghosts;
+  for (const GhostFace& face : ghost_faces(mesh, fill, penalty)) {
+    const double mu = 0.5 * (materials[static_cast<std::size_t>(face.cell[0])].mu() +
+                             materials[static_cast<std::size_t>(face.cell[1])].mu());
+    ghosts.push_back(ghost_matrix(mesh, face, mu, penalty));
+  }
   LeafMatrices matrices;
-  make_pattern(mesh, matrices);
+  make_pattern(mesh, ghosts, matrices);
+  matrices.ghost.assign(matrices.column.size(), 0.0);
   matrices.mass.assign(matrices.column.size(), 0.0);
   matrices.tie.assign(matrices.column.size(), 0.0);
   matrices.stiffness.assign(matrices.column.size(), Eigen::Matrix3d::Zero());
@@ -100,6 +113,16 @@ LeafMatrices assemble(const lattice::LeafMesh& mesh, std::span<const Material> m
                                                                mesh.cells[c][static_cast<std::size_t>(b)]));
         matrices.mass[e] += mass(a, b);
         matrices.stiffness[e] += stiffness.block<3, 3>(3 * a, 3 * b);
+      }
+    }
+  }
+  for (const GhostMatrix& ghost : ghosts) {
+    for (std::size_t a = 0; a < ghost.vertices.size(); ++a) {
+      for (std::size_t b = 0; b < ghost.vertices.size(); ++b) {
+        const auto e = static_cast<std::size_t>(matrices.entry(ghost.vertices[a], ghost.vertices[b]));
+        const double s = ghost.matrix(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
+        matrices.ghost[e] += s;
+        matrices.stiffness[e].diagonal().array() += s;
       }
     }
   }
@@ -119,6 +142,13 @@ Points apply_stiffness(const LeafMatrices& matrices, const Points& x) {
 Points apply_tie(const LeafMatrices& matrices, const Points& x) {
   return apply_rows(matrices, [&](std::size_t e, int b) -> Eigen::Vector3d {
     return matrices.tie[e] * x.row(b).transpose();
+  });
+}
+Points apply_ghost(const LeafMatrices& matrices, const Points& x) {
+  if (x.rows() == 0) return x;
+  const Points from_first = x.rowwise() - Eigen::RowVector3d(x.row(0));
+  return apply_rows(matrices, [&](std::size_t e, int b) -> Eigen::Vector3d {
+    return matrices.ghost[e] * from_first.row(b).transpose();
   });
 }
 

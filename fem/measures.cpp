@@ -110,6 +110,21 @@ double tie_energy(const Body& body, const lattice::Points& x, const PosedFrames&
   return energy;
 }
 
+/// 1/2 x^T S x, of what x is beside the grown shape where joints grow.
+double ghost_energy(const Body& body, const lattice::Points& x, const PosedFrames& posed,
+                    const Growth* growth) {
+  lattice::Points from = x.rowwise() - Eigen::RowVector3d(x.row(0));
+  for (int a = 0; growth != nullptr && a < body.mesh.num_vertices(); ++a) {
+    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+      const auto f = static_cast<std::size_t>(it.col());
+      const Eigen::Vector3d origin = posed.frames[f].from_rest * body.tree.frames[f].origin_rest;
+      const Eigen::Vector3d grown = growth->shape.row(a).transpose() - growth->origin[f];
+      from.row(a) -= it.value() * (origin + posed.frames[f].rotation * grown).transpose();
+    }
+  }
+  return 0.5 * from.cwiseProduct(apply_ghost(body.matrices, from)).sum();
+}
+
 /// -m g . x, relative to the rest pose's.
 double potential_energy(const Body& body, const lattice::Points& x, const Eigen::Vector3d& gravity) {
   double energy = 0.0;
@@ -155,8 +170,9 @@ double StoredEnergy::of(const lattice::Points& x) const {
     cells[c] = sum.energy(body.materials[c].bulk());
   });
   double energy = std::accumulate(cells.begin(), cells.end(), potential_energy(body, x, gravity_));
-  if (!body.ties.empty()) energy += tie_energy(body, x, posed_, grown_ ? &*grown_ : nullptr);
-  return energy;
+  const Growth* grown = grown_ ? &*grown_ : nullptr;
+  if (!body.ties.empty()) energy += tie_energy(body, x, posed_, grown);
+  return energy + ghost_energy(body, x, posed_, grown);
 }
 
 Measures measure(const Body& body, const lattice::Points& x, const lattice::Points& v,
@@ -179,6 +195,7 @@ Measures measure(const Body& body, const lattice::Points& x, const lattice::Poin
     if (cells[c].det <= 0.0) ++m.inverted_cells;
   }
   if (!body.ties.empty()) m.ties = tie_energy(body, x, posed, grown ? &*grown : nullptr);
+  m.ghost = ghost_energy(body, x, posed, grown ? &*grown : nullptr);
   m.kinetic = kinetic_energy(body, v);
   m.potential = potential_energy(body, x, gravity);
   m.largest_speed = v.rows() > 0 ? v.rowwise().norm().maxCoeff() : 0.0;

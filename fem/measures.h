@@ -15,6 +15,7 @@ struct Measures {
   double elastic = 0.0;        ///< 1/2 u^T K u, u of each cell in the rotation of its dominant frames [J].
   double potential = 0.0;      ///< -m g . x, relative to the rest pose's [J].
   double ties = 0.0;           ///< sum over ties of kappa/2 int |p - T_b r|^2 dV [J].
+  double ghost = 0.0;          ///< 1/2 x^T S x, of the ghost penalty [J].
   double largest_speed = 0.0;  ///< [m/s].
   double bone_residual = 0.0;  ///< largest distance of a bone vertex from the clip [m].
   double largest_strain =
@@ -28,7 +29,8 @@ struct Measures {
 /// 1/2 v^T M v [J]; v: num_vertices x 3 [m/s].
 double kinetic_energy(const Body& body, const lattice::Points& v);
 
-/// Elastic energy, ties and potential as Measures has them, together, of any flesh in one pose.
+/// Elastic energy, ties, ghost penalty and potential as Measures has them, together, of any flesh in one
+/// pose.
 class StoredEnergy {
  public:
   /// `body` must outlive it.

@@ -92,7 +92,7 @@ class Simulation {
   lattice::Points velocities_at(double time) const;
   Measures measures_at(double time) const;
   /// The embedded skin: rows of `positions`.
-  lattice::Points skin_of(const lattice::Points& positions) const { return body_.skin.weights * positions; }
+  lattice::Points skin_of(const lattice::Points& positions) const { return body_.skin_rows * positions; }
   SolverCounts counts() const { return model_->counts(); }
   /// What blending made of energy while the bones stood still, and was taken out again.
   EnergyCap::Taken energy_taken() const { return energy_cap_ ? energy_cap_->taken() : EnergyCap::Taken{}; }

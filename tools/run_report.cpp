@@ -21,6 +21,7 @@ Json frame_json(const FrameReport& f, int active) {
           {"elastic_J", m.elastic},
           {"potential_J", m.potential},
           {"ties_J", m.ties},
+          {"ghost_J", m.ghost},
           {"largest_speed_m_per_s", m.largest_speed},
           {"bone_residual_m", m.bone_residual},
           {"largest_strain", m.largest_strain},

@@ -136,7 +136,7 @@ void offset_from_skinning(const Character& character, const fem::Body& body,
                           const std::vector<Eigen::Affine3d>& pose, double time, double share,
                           CharacterFrame& frame) {
   const Points bottom =
-      body.skin.weights * fem::skinned_positions(body, fem::pose_frames(body.tree, pose, time));
+      body.skin_rows * fem::skinned_positions(body, fem::pose_frames(body.tree, pose, time));
   const std::vector<int>& map = character.input.skin.surface_of_vertex;
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (map[i] < 0) continue;

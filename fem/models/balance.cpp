@@ -96,7 +96,8 @@ Balance stage_balance(const Body& body, const StageProblem& p) {
   b.inertia = (of_velocity + alpha) / eta_h;
   b.origin = *p.x_h;
   b.target = (of_velocity * *p.v_h + (alpha / kappa_h) * (carried_past - b.origin)) / b.inertia;
-  b.pull = tie_pull(body, *p.poses.stage, b.origin);
+  b.pull = tie_pull(body, *p.poses.stage, b.origin) -
+           apply_ghost(body.matrices, (1.0 + b.damping) * b.origin - b.damping * carried_past);
   b.load = weights(body, p.gravity, p.force);
 
   Points place = state.x + p.elapsed * predicted_velocity(body, state, p.poses, p.elapsed);
@@ -112,7 +113,7 @@ Balance rest_balance(const Body& body, const PoseProblem& problem, const Points&
   b.origin = guess;
   place_bones(body, *problem.pose, b.origin);
   fill_inactive_leaves(body, b.origin);
-  b.pull = tie_pull(body, *problem.pose, b.origin);
+  b.pull = tie_pull(body, *problem.pose, b.origin) - apply_ghost(body.matrices, b.origin);
   b.load = weights(body, problem.gravity, problem.force);
   b.guess = Points::Zero(guess.rows(), 3);
   return b;
@@ -127,7 +128,7 @@ OuterForces outer_forces(const Body& body, const Balance& b, const Points& move)
     Eigen::RowVector3d both = Eigen::RowVector3d::Zero(), tied = both, carried = both;
     for (auto e = static_cast<std::size_t>(m.row_start[i]); e < static_cast<std::size_t>(m.row_start[i + 1]);
          ++e) {
-      const Eigen::RowVector3d tie = m.tie[e] * move.row(m.column[e]);
+      const Eigen::RowVector3d tie = (m.tie[e] + (1.0 + b.damping) * m.ghost[e]) * move.row(m.column[e]);
       both -= tie;
       tied += tie;
       if (!moving) continue;

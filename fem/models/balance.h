@@ -6,17 +6,19 @@
 #include "fem/models/model.h"
 
 /// The balance of forces that models which solve the flesh as one system bring about, in a stage or at rest:
-///   inertia M (target - d) + (ties) + load - f(origin + d) = 0  at every unknown.
+///   inertia M (target - d) + (ties and ghost penalty) + load - f(origin + d) = 0  at every unknown.
 /// The unknown is the move d from an origin and not the position: a step of 1e-7 s moves flesh by less than
 /// the last digit of where it is, and its inertia would be that digit's.
 namespace sinew::fem {
 
 /// Everything but the elastic force f; bones stay where `guess` moves them.
 struct Balance {
-  double inertia = 0.0;               ///< mass matrix per squared step, with mass damping [1/s^2]; 0 at rest.
-  lattice::Points origin;             ///< what moves are counted from [m]: of a stage its predictor x_h.
-  lattice::Points target;             ///< move that inertia alone would bring [m]; empty at rest.
-  lattice::Points pull;               ///< of the ties at the origin [N], sum_b P_b (T_b X) - P origin.
+  double inertia = 0.0;    ///< mass matrix per squared step, with mass damping [1/s^2]; 0 at rest.
+  lattice::Points origin;  ///< what moves are counted from [m]: of a stage its predictor x_h.
+  lattice::Points target;  ///< move that inertia alone would bring [m]; empty at rest.
+  /// Of ties and ghost penalty at the origin [N]: sum_b P_b (T_b X) - P origin - S [(1 + damping) origin -
+  /// damping past], the past carried along with its frames.
+  lattice::Points pull;
   lattice::Points load;               ///< gravity and loads [N].
   double damping = 0.0;               ///< stiffness damping, beta / (kappa h) [-]; 0 at rest.
   std::vector<PastPlace> past;        ///< what the strain's rate is measured against.

@@ -32,11 +32,11 @@ struct RestSystem {
     std::vector<CellStiffness> matrices;
     for (std::size_t c = 0; c < rotations.size(); ++c)
       matrices.push_back(cells.rotated(static_cast<int>(c), rotations[c]));
-    rest.assemble(0.0, 1.0, matrices);
+    rest.assemble({0.0, 1.0, 1.0}, matrices);
     const SystemFactors of =
         system_factors(stage_of(Integrator::BackwardEuler), h, body.damping.alpha(), body.damping.beta());
     for (CellStiffness& matrix : matrices) matrix *= of.stiffness;
-    step.assemble(of.mass, of.tie, matrices);
+    step.assemble({of.mass, of.tie, of.stiffness}, matrices);
     factor_report = factor.factorise(rest.lower());
   }
 

@@ -79,7 +79,7 @@ Points FreeVertices::gather(const Points& leaf_forces) const {
 
 BlockSystem::BlockSystem(const Body& body, const FreeVertices& free) {
   struct Entry {
-    double mass = 0.0, tie = 0.0;
+    double mass = 0.0, tie = 0.0, ghost = 0.0;
     std::vector<Part> parts;
   };
   std::vector<std::map<int, Entry>> rows(free.vertex.size());
@@ -100,6 +100,7 @@ BlockSystem::BlockSystem(const Body& body, const FreeVertices& free) {
       each_pair(a, m.column[e], [&](Entry& entry, double weight) {
         entry.mass += weight * m.mass[e];
         entry.tie += weight * m.tie[e];
+        entry.ghost += weight * m.ghost[e];
       });
     }
   }
@@ -121,6 +122,7 @@ BlockSystem::BlockSystem(const Body& body, const FreeVertices& free) {
       column_.push_back(column);
       mass_.push_back(entry.mass);
       tie_.push_back(entry.tie);
+      ghost_.push_back(entry.ghost);
       parts_.insert(parts_.end(), entry.parts.begin(), entry.parts.end());
       part_start_.push_back(static_cast<int>(parts_.size()));
     }
@@ -144,13 +146,13 @@ BlockSystem::BlockSystem(const Body& body, const FreeVertices& free) {
   lower_.setFromTriplets(pattern.begin(), pattern.end());
 }
 
-void BlockSystem::assemble(double mass, double tie, const std::vector<CellStiffness>& cells) {
+void BlockSystem::assemble(const Shares& shares, const std::vector<CellStiffness>& cells) {
   over_rows(static_cast<int>(row_start_.size()) - 1, [&](int row) {
     const auto i = static_cast<std::size_t>(row);
     for (auto e = static_cast<std::size_t>(row_start_[i]); e < static_cast<std::size_t>(row_start_[i + 1]);
          ++e) {
       Block sum = Block::Zero();
-      sum.diagonal().array() += mass * mass_[e] + tie * tie_[e];
+      sum.diagonal().array() += shares.mass * mass_[e] + shares.tie * tie_[e] + shares.ghost * ghost_[e];
       for (auto k = static_cast<std::size_t>(part_start_[e]);
            k < static_cast<std::size_t>(part_start_[e + 1]); ++k) {
         const Part& p = parts_[k];

@@ -33,8 +33,14 @@ class BlockSystem {
   /// `body` and `free` must outlive the system.
   BlockSystem(const Body& body, const FreeVertices& free);
 
-  /// A = mass M + tie P + the cells' matrices, one per leaf cell.
-  void assemble(double mass, double tie, const std::vector<CellStiffness>& cells);
+  /// What the constant matrices count.
+  struct Shares {
+    double mass = 0.0;   ///< of M.
+    double tie = 0.0;    ///< of P.
+    double ghost = 0.0;  ///< of S.
+  };
+  /// A = mass M + tie P + ghost S + the cells' matrices, one per leaf cell.
+  void assemble(const Shares& shares, const std::vector<CellStiffness>& cells);
 
   /// y = A x; num_unknowns x 3.
   void apply(const lattice::Points& x, lattice::Points& y) const;
@@ -53,7 +59,7 @@ class BlockSystem {
   };
 
   std::vector<int> row_start_, column_;
-  std::vector<double> mass_, tie_;
+  std::vector<double> mass_, tie_, ghost_;
   std::vector<int> part_start_;
   std::vector<Part> parts_;
   std::vector<Block> block_;

@@ -25,7 +25,7 @@ NewtonSolver::NewtonSolver(std::string name, const Body& body, const FreeVertice
       hessians_(body.mesh.cells.size(), CellStiffness::Zero()),
       gradients_(body.mesh.cells.size()),
       energies_(body.mesh.cells.size()) {
-  system_.assemble(1.0, 0.0, hessians_);
+  system_.assemble({1.0, 0.0, 0.0}, hessians_);
   mass_diagonal_ = system_.diagonal();
 }
 
@@ -53,7 +53,7 @@ Points NewtonSolver::elastic_forces(const Points& x) {
 Factor::Report NewtonSolver::factorise(const Balance& balance, const Points& x) {
   each_cell(
       [&](int c, const CellPoints& p) { hessians_[static_cast<std::size_t>(c)] = energy_.hessian(c, p); }, x);
-  system_.assemble(balance.inertia, 1.0, hessians_);
+  system_.assemble({balance.inertia, 1.0, 1.0 + balance.damping}, hessians_);
   Factor::Report report = factor_.factorise(system_.lower());
   if (report.ok) return report;
   // As little of the positive parts as does: all of them make the flesh so stiff that near a state from which
@@ -68,7 +68,7 @@ Factor::Report NewtonSolver::factorise(const Balance& balance, const Points& x) 
   for (double share : {1.0 / 32.0, 1.0 / 8.0, 1.0 / 2.0, 1.0}) {
     for (std::size_t c = 0; c < whole.size(); ++c)
       hessians_[c] = share < 1.0 ? CellStiffness(whole[c] + share * (positive[c] - whole[c])) : positive[c];
-    system_.assemble(balance.inertia, 1.0, hessians_);
+    system_.assemble({balance.inertia, 1.0, 1.0 + balance.damping}, hessians_);
     report = factor_.factorise(system_.lower());
     if (report.ok) return report;
   }

@@ -180,7 +180,8 @@ Points RotatedModel::apply(const Balance& balance, const Rotations& rotations, c
           Eigen::Vector3d sum = cells_.cells().groups().sum_at(a, corner_forces_);
           for (auto e = static_cast<std::size_t>(m.row_start[i]);
                e < static_cast<std::size_t>(m.row_start[i + 1]); ++e)
-            sum += (balance.inertia * m.mass[e] + m.tie[e]) * leaves.row(m.column[e]).transpose();
+            sum += (balance.inertia * m.mass[e] + m.tie[e] + (1.0 + balance.damping) * m.ghost[e]) *
+                   leaves.row(m.column[e]).transpose();
           forces.row(a) = sum.transpose();
         }
       });
@@ -192,7 +193,7 @@ bool RotatedModel::refactor(const Balance& balance, const Rotations& rotations, 
   tbb::parallel_for(std::size_t{0}, matrices.size(), [&](std::size_t c) {
     matrices[c] = (1.0 + balance.damping) * cells_.rotated(static_cast<int>(c), rotations[c]);
   });
-  system_.assemble(balance.inertia, 1.0, matrices);
+  system_.assemble({balance.inertia, 1.0, 1.0 + balance.damping}, matrices);
   const Factor::Report factor = factor_.factorise(system_.lower());
   if (!factor.ok) {
     report.status = SolveStatus::NotPositiveDefinite;

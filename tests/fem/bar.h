@@ -29,6 +29,8 @@ struct BarOptions {
   std::function<void(const lattice::Hierarchy&, lattice::ActiveSet&)> refine;
   /// Fill of the Gauss point at x; full where empty.
   std::function<double(const Eigen::Vector3d&)> fill;
+  /// None: answers for cells that are partly filled are those of their flesh alone.
+  fem::GhostPenalty ghost{0.0, 0.0};
 };
 
 /// Rayleigh damping C = alpha M + beta K as a ratio at a frequency.
@@ -57,7 +59,7 @@ inline fem::Body bar_body(const BarOptions& options) {
     }
   }
   std::vector<fem::Material> materials(mesh.cells.size(), options.material);
-  fem::LeafMatrices matrices = fem::assemble(mesh, materials, fill);
+  fem::LeafMatrices matrices = fem::assemble(mesh, materials, fill, options.ghost);
   const int n = mesh.num_vertices();
 
   fem::FrameTree tree;
@@ -102,7 +104,9 @@ inline fem::Body bar_body(const BarOptions& options) {
                  {},
                  {},
                  0.0,
-                 0.0};
+                 0.0,
+                 {}};
+  body.skin_rows = body.skin.weights;
   const lattice::Points sums = fem::apply_mass(body.matrices, lattice::Points::Ones(n, 3));
   for (int a = 0; a < n; ++a) body.vertex_mass.push_back(sums(a, 0));
   body.volume = sums.col(0).sum() / options.material.density;
