@@ -1,27 +1,25 @@
 #include "fem/default_material.h"
 
 #include <algorithm>
-#include <optional>
+#include <cmath>
+
+#include "fem/joint_flesh.h"
 
 namespace sinew::fem {
 namespace {
 
-/// Acceleration [m/s^2] that the ends of a bone stay below for 95 % of the clip; 0 for fewer than three
-/// poses. The rest are jerks: kinks between keys, which flesh should show rather than be built for.
-double usual_acceleration(const lattice::LatticeBone& bone, const DefaultMaterialInput& input) {
+/// Acceleration [m/s^2] that the ends of a joint's bones stay below for 95 % of the clip; 0 for fewer than
+/// three poses. The rest are jerks: kinks between keys, which flesh should show rather than be built for.
+double usual_acceleration(int joint, const std::vector<int>& ends, const DefaultMaterialInput& input) {
   std::vector<double> accelerations;
-  const auto at = [&](std::size_t k, const lattice::BoneAnchor& anchor, bool end) -> Eigen::Vector3d {
-    const auto& pose = input.poses[k];
-    return end ? pose[static_cast<std::size_t>(anchor.joint_b)] * anchor.x_b
-               : pose[static_cast<std::size_t>(anchor.joint_a)] * anchor.x_a;
-  };
-  for (std::size_t k = 1; k + 1 < input.poses.size(); ++k) {
-    for (const bool end : {false, true}) {
-      const lattice::BoneAnchor& anchor = end ? bone.end : bone.start;
-      const Eigen::Vector3d second =
-          at(k + 1, anchor, end) - 2.0 * at(k, anchor, end) + at(k - 1, anchor, end);
-      accelerations.push_back(second.norm() / (input.spacing * input.spacing));
-    }
+  for (const int end : ends) {
+    // A bone's end moves with the joint there; its start is the first of the ends.
+    const Eigen::Vector3d rest = input.skeleton.joint(end).rest_from_joint.translation();
+    const auto at = [&](std::size_t k) -> Eigen::Vector3d {
+      return input.poses[k][static_cast<std::size_t>(joint)] * rest;
+    };
+    for (std::size_t k = 1; k + 1 < input.poses.size(); ++k)
+      accelerations.push_back((at(k + 1) - 2.0 * at(k) + at(k - 1)).norm() / (input.spacing * input.spacing));
   }
   if (accelerations.empty()) return 0.0;
   const auto nth = accelerations.begin() +
@@ -32,35 +30,50 @@ double usual_acceleration(const lattice::LatticeBone& bone, const DefaultMateria
 
 }  // namespace
 
-double default_young(double thickness, double density, double poisson, double gravity, double motion) {
-  constexpr double kSwing = 8.0;  // f [Hz]
-  const double mu = std::max({16.0 * density * kSwing * kSwing * thickness * thickness,
-                              density * gravity * thickness / 0.12, 2.0 * density * motion * thickness});
-  return 2.0 * (1.0 + poisson) * mu;
+double default_young(const FleshLoad& load) {
+  const double t = load.thickness, rho = load.density;
+  const double mu = std::max({16.0 * rho * load.frequency * load.frequency * t * t,
+                              rho * load.gravity * t / 0.12, 2.0 * rho * load.motion * t});
+  const double young = 2.0 * (1.0 + load.poisson) * mu;
+  if (!(load.overhang > 0.0)) return young;
+  const double d = std::max(load.half_thickness, 0.15 * load.overhang);
+  const double slender = rho * load.overhang * load.overhang * load.overhang / (d * d);
+  return std::max({young, 5.0 * slender * load.gravity, 2.0 * slender * load.motion});
+}
+
+double default_frequency(double size, double fastest) {
+  constexpr double kHuman = 1.8, kSwing = 7.0;  // m, Hz
+  return std::min(kSwing * std::sqrt(kHuman / size), fastest);
 }
 
 DefaultMaterials default_materials(const DefaultMaterialInput& input) {
-  const FrameTree tree = frame_tree(input.lattice, input.skeleton);
-  const std::optional<lattice::MirrorMap> mirror = lattice::find_mirror_map(input.lattice, input.skin);
-  const LimbRadii radii(input.lattice, tree, input.skin, input.lattice.edge_length,
-                        mirror ? &*mirror : nullptr);
   DefaultMaterials materials;
-  materials.thickness = radii.typical();
-  const auto young = [&](double thickness, double motion) {
-    return default_young(thickness, input.density, input.poisson, input.gravity, motion);
-  };
-  materials.base = {young(materials.thickness, 0.0), input.poisson, input.density};
-  for (const Frame& frame : tree.frames) {
-    double thickness = materials.thickness, motion = 0.0;
-    for (std::size_t b = 0; b < input.lattice.bones.size(); ++b) {
-      const auto& bone = input.lattice.bones[b];
-      if (bone.frame != frame.joint) continue;
-      thickness = std::max(thickness, radii.of_bone(static_cast<int>(b)));
-      motion = std::max(motion, usual_acceleration(bone, input));
-    }
-    Material material = materials.base;
-    material.young = young(thickness, motion);
-    if (material.young > materials.base.young) materials.of_joints.push_back({frame.joint, material});
+  materials.thickness = typical_radius(input.skin, input.skeleton);
+  materials.frequency = default_frequency(input.size, input.fastest);
+  FleshLoad load;
+  load.thickness = materials.thickness;
+  load.frequency = materials.frequency;
+  load.density = input.density;
+  load.poisson = input.poisson;
+  load.gravity = input.gravity;
+  materials.base = {default_young(load), input.poisson, input.density};
+  const std::vector<JointFlesh> flesh = joint_flesh(input.skin, input.skeleton);
+  std::vector<double> young(flesh.size(), 0.0);
+  for (int j = 0; j < input.skeleton.num_joints(); ++j) {
+    const JointFlesh& f = flesh[static_cast<std::size_t>(j)];
+    if (!(f.area > 0.0)) continue;
+    load.thickness = std::max(materials.thickness, f.radius);
+    load.half_thickness = f.half_thickness;
+    load.overhang = f.overhang;
+    load.motion = usual_acceleration(j, f.ends, input);
+    young[static_cast<std::size_t>(j)] = default_young(load);
+  }
+  for (int j = 0; j < input.skeleton.num_joints(); ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    const int partner = input.partners.empty() ? -1 : input.partners[i];
+    const double of_both =
+        partner < 0 ? young[i] : std::max(young[i], young[static_cast<std::size_t>(partner)]);
+    if (of_both > materials.base.young) materials.of_joints.push_back({j, of_both});
   }
   return materials;
 }

@@ -3,21 +3,10 @@
 #include <algorithm>
 #include <limits>
 
+#include "fem/weighted_quantile.h"
+
 namespace sinew::fem {
 namespace {
-
-/// Weighted median of (value, weight) pairs; 0 when there are none.
-double weighted_median(std::vector<std::pair<double, double>> values) {
-  std::sort(values.begin(), values.end());
-  double total = 0.0;
-  for (const auto& [value, weight] : values) total += weight;
-  double sum = 0.0;
-  for (const auto& [value, weight] : values) {
-    sum += weight;
-    if (sum >= 0.5 * total) return value;
-  }
-  return 0.0;
-}
 
 /// A third of the area of the triangles round each vertex [m^2].
 std::vector<double> vertex_areas(const lattice::Surface& skin) {
@@ -88,9 +77,9 @@ LimbRadii::LimbRadii(const lattice::ControlLattice& lattice, const FrameTree& tr
   }
   if (mirror != nullptr) share(mirror->bones);
   for (std::size_t b = 0; b < bones_.size(); ++b) {
-    std::vector<std::pair<double, double>> values;
-    for (const Sample& s : bones_[b].samples) values.emplace_back(s.distance, s.area);
-    bones_[b].median = weighted_median(std::move(values));
+    std::vector<WeightedValue> values;
+    for (const Sample& s : bones_[b].samples) values.push_back({s.distance, s.area});
+    bones_[b].median = weighted_quantile(std::move(values), 0.5);
     if (!(bones_[b].median > 0.0)) {
       bones_[b].median = 0.1 * (lattice.bones[b].rest_end - lattice.bones[b].rest_start).norm();
     }
@@ -110,18 +99,12 @@ void LimbRadii::share(const std::vector<int>& partner) {
 }
 
 double LimbRadii::near(int bone, double along) const {
-  std::vector<std::pair<double, double>> values;
+  std::vector<WeightedValue> values;
   for (const Sample& s : bones_[static_cast<std::size_t>(bone)].samples) {
-    if (std::abs(s.along - along) <= window_) values.emplace_back(s.distance, s.area);
+    if (std::abs(s.along - along) <= window_) values.push_back({s.distance, s.area});
   }
-  const double local = weighted_median(std::move(values));
+  const double local = weighted_quantile(std::move(values), 0.5);
   return local > 0.0 ? local : of_bone(bone);
-}
-
-double LimbRadii::typical() const {
-  std::vector<std::pair<double, double>> values;
-  for (const Bone& bone : bones_) values.emplace_back(bone.median, 1.0);
-  return weighted_median(std::move(values));
 }
 
 }  // namespace sinew::fem

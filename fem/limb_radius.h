@@ -22,8 +22,6 @@ class LimbRadii {
   /// Radius [m] near the point at distance `along` [m] from the bone's start, over the skin within the
   /// window; else of_bone.
   double near(int bone, double along) const;
-  /// Median over the bones [m]: t of default_young.
-  double typical() const;
 
  private:
   struct Sample {

@@ -13,6 +13,7 @@
 #include "assets/lattice_cache.h"
 #include "assets/lattice_files.h"
 #include "fem/default_material.h"
+#include "lattice/mirror_map.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
 #include "tools/lattice_memory.h"
@@ -72,9 +73,17 @@ fem::DefaultMaterials default_materials(const Scene& scene, const Character& c) 
   // The sag rule speaks of the gravity that the flesh is built for: the Earth's where the scene has none.
   constexpr double kEarth = 9.81;
   const std::vector<std::vector<Eigen::Affine3d>> poses = sample_poses(c);
-  return fem::default_materials({c.lattice.lattice, c.input.skin.surface, c.rig.skeleton, poses, kPoseSpacing,
-                                 scene.density, scene.poisson,
-                                 scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth});
+  const lattice::Points& skin = c.input.skin.surface.points;
+  fem::DefaultMaterialInput input{c.input.skin.surface, c.rig.skeleton, poses};
+  input.spacing = kPoseSpacing;
+  if (const auto mirror = lattice::find_mirror_map(c.lattice.lattice, c.input.skin.surface))
+    input.partners = mirror->frames;
+  input.size = (skin.colwise().maxCoeff() - skin.colwise().minCoeff()).maxCoeff();
+  input.fastest = 0.25 * scene.fps;
+  input.density = scene.density;
+  input.poisson = scene.poisson;
+  input.gravity = scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth;
+  return fem::default_materials(input);
 }
 
 /// The material of a joint's flesh so far.
@@ -193,7 +202,16 @@ void settle_materials(const Scene& scene, Character& c) {
     const fem::DefaultMaterials defaults = default_materials(scene, c);
     c.limb_thickness = defaults.thickness;
     body.material = defaults.base;
-    body.materials = defaults.of_joints;
+    c.swing = defaults.frequency;
+    // Of joints that the lattice made one the stiffest counts.
+    std::map<int, double> of_frames;
+    for (const fem::JointYoung& joint : defaults.of_joints) {
+      const int merged = c.lattice.lattice.frame_of_joint[static_cast<std::size_t>(joint.joint)];
+      double& young = of_frames[merged >= 0 ? merged : joint.joint];
+      young = std::max(young, joint.young);
+    }
+    for (const auto& [joint, young] : of_frames)
+      body.materials.push_back({joint, {young, body.material.poisson, body.material.density}});
   }
   if (scene.young) {
     body.material.young = *scene.young;

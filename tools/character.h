@@ -28,6 +28,7 @@ struct Character {
   std::vector<fem::HeldPlane> held;  ///< of a plain scene.
   std::vector<int> bare_frames;      ///< of a plain scene that nothing holds.
   double limb_thickness = 0.0;       ///< t of the default stiffness [m].
+  double swing = 0.0;                ///< f of the default stiffness [Hz].
   PhaseTimes times;
 
   const skeleton::Clip& the_clip() const { return rig.clips[static_cast<std::size_t>(clip)]; }

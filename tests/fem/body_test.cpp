@@ -7,7 +7,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "fem/default_material.h"
 #include "tests/fem/arm.h"
 #include "tests/lattice/shapes.h"
 
@@ -196,7 +195,6 @@ TEST(LimbRadii, AreTheMedianDistanceOfTheSkin) {
   // 0.1414.
   EXPECT_NEAR(radii.of_bone(0), std::hypot(0.1, 0.05), 1e-12);
   EXPECT_NEAR(radii.near(1, 0.25), std::hypot(0.1, 0.05), 1e-12);
-  EXPECT_NEAR(radii.typical(), std::hypot(0.1, 0.05), 1e-12);
   lattice::Surface bare = arm.skin;
   for (auto& influences : bare.weights) influences = {{0, 1.0}};
   // No skin counts for the forearm: a tenth of its length.
@@ -266,14 +264,6 @@ TEST(MakeBody, RefusesASkinWithoutItsWeights) {
   arm = good;
   for (auto& bone : arm.lattice.bones) bone.frame = 9;
   EXPECT_EQ(message(arm, {tests::arm_pose(0.0)}), "lattice bone names joint 9, expected 0 to 2");
-}
-
-// t = 0.1 m: mu = max(16 * 1000 * 64 * 0.01, 1000 * 9.81 * 0.1 / 0.12) = max(10240, 8175) Pa; E = 2 * 1.45 *
-// mu. t = 0.01 m: max(102.4, 817.5). With bones thrown about at 100 m/s^2: 2 * 1000 * 100 * 0.1 = 20000.
-TEST(DefaultYoung, SwingsOrSagsByTheRule) {
-  EXPECT_NEAR(default_young(0.1, 1000.0, 0.45, 9.81, 100.0), 2.9 * 20000.0, 1e-8);
-  EXPECT_NEAR(default_young(0.1, 1000.0, 0.45, 9.81, 0.0), 2.9 * 10240.0, 1e-8);
-  EXPECT_NEAR(default_young(0.01, 1000.0, 0.45, 9.81, 0.0), 2.9 * 817.5, 1e-9);
 }
 
 TEST(Damping, HasItsRatioAtItsFrequency) {

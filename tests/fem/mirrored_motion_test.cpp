@@ -79,11 +79,16 @@ double asymmetry(const Rig& rig, const lattice::ControlLattice& lattice) {
   const skeleton::Skeleton skeleton = skeleton_of(rig.joints);
   const std::vector<std::vector<Affine3d>> poses{pose(rig.joints, 0.0), pose(rig.joints, 0.3)};
   BodyOptions options;
-  const DefaultMaterials materials = default_materials({lattice, rig.skin, skeleton, poses, 0.3});
+  DefaultMaterialInput flesh{rig.skin, skeleton, poses};
+  flesh.spacing = 0.3;
+  flesh.partners = lattice::find_mirror_map(lattice, rig.skin)->frames;
+  const DefaultMaterials materials = default_materials(flesh);
   options.material = materials.base;
-  options.materials = materials.of_joints;
+  for (const JointYoung& joint : materials.of_joints)
+    options.materials.push_back({joint.joint, {joint.young, materials.base.poisson, materials.base.density}});
   const Body body = make_body({lattice, rig.skin, skeleton, poses}, options);
   SimulationOptions run;
+  run.model = "blended";
   run.settle_limit = 0.5;
   Simulation simulation(
       body, [&](double time) { return pose(rig.joints, time); }, 0.0, run);
