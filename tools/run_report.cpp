@@ -27,6 +27,8 @@ Json frame_json(const FrameReport& f, int active) {
           {"largest_strain", m.largest_strain},
           {"min_det_j", m.min_det},
           {"inverted_cells", m.inverted_cells},
+          {"mended_area", f.mended.area},
+          {"largest_mended_m", f.mended.largest},
           {"flipped_triangles", f.flipped_triangles}};
 }
 

@@ -5,6 +5,7 @@
 
 #include "fem/measures.h"
 #include "fem/simulation.h"
+#include "fem/skin_guard.h"
 #include "tools/character.h"
 
 /// report.json: what a run did and what it found.
@@ -16,6 +17,7 @@ struct FrameReport {
   double time = 0.0;  ///< of the clip [s].
   int steps = 0;      ///< taken since the frame before.
   fem::Measures measures;
+  fem::Mended mended;         ///< of the skin; lengths [m].
   int flipped_triangles = 0;  ///< skin triangles that face against their bones' rotation.
 };
 

@@ -57,7 +57,8 @@ bool is_of_characters(std::string_view key) {
   constexpr std::string_view kKeys[] = {
       "rig",      "clip",          "lattice",   "lattice_space", "snap_tolerance", "soft_bones",
       "cache",    "cells",         "cell_size", "bones_include", "bones_exclude",  "tip_bones",
-      "symmetry", "coarsen_rigid", "height",    "output_space",  "output_mesh"};
+      "symmetry", "coarsen_rigid", "height",    "output_space",  "output_mesh",
+      "guard"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 

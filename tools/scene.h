@@ -149,6 +149,8 @@ struct Scene {
   /// What is written is the rig's own skinning plus this share of (model - `skin`) [-]; 0 ... 10, 0 = plain
   /// skinning. Unset: the model's flesh itself.
   std::optional<double> offset;
+  /// Lay the skin back towards plain skinning where cells are too coarse to carry it (fem/skin_guard.h).
+  Switch guard = Switch::On;
   /// The contact sheet of frames.
   Switch preview = Switch::On;
   /// Threads; 0 ... 1024, 0 = all. The results do not depend on it.

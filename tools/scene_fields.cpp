@@ -115,6 +115,8 @@ constexpr auto kFields = std::to_array<SceneField>({
      {0.0, 10.0},
      "",
      "1"},
+    {"guard", &Scene::guard,
+     "on or off: lay skin back towards plain skinning where it would tear or crease as cells are too coarse"},
     {"preview", &Scene::preview, "on or off: the picture of eight frames"},
     {"threads",
      &Scene::threads,

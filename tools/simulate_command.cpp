@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -23,6 +24,8 @@
 #include "assets/sidecar.h"
 #include "fem/envelope.h"
 #include "fem/placement.h"
+#include "fem/skin_guard.h"
+#include "lattice/limb_copies.h"
 #include "tools/body_fields.h"
 #include "tools/character.h"
 #include "tools/command.h"
@@ -216,6 +219,63 @@ void write_companions(const Scene& scene, const Character& character, const Outp
   out.write("report.json", report_json(report, character, body));
 }
 
+/// Mends the flesh of a frame against its plain skinning.
+class FrameGuard {
+ public:
+  FrameGuard(const Scene& scene, const Character& character) : map_(character.input.skin.surface_of_vertex) {
+    const lattice::Surface& surface = character.input.skin.surface;
+    if (scene.guard == Switch::On && !scene.plain) guard_.emplace(surface.points, surface.triangles);
+    count_ = surface.points.rows();
+  }
+
+  /// Vertices of the result are those of the welded skin.
+  fem::Mended mend(CharacterFrame& frame) const {
+    if (!guard_) return {};
+    Points flesh(count_, 3), plain(count_, 3);
+    each([&](Eigen::Index row, int vertex) {
+      flesh.row(vertex) = frame.simulated.row(row);
+      plain.row(vertex) = frame.skinned.row(row);
+    });
+    const fem::Mended mended = guard_->mend(plain, flesh);
+    if (mended.vertex >= 0)
+      each([&](Eigen::Index row, int vertex) { frame.simulated.row(row) = flesh.row(vertex); });
+    return mended;
+  }
+
+ private:
+  template <class Action>
+  void each(const Action& action) const {
+    for (std::size_t i = 0; i < map_.size(); ++i)
+      if (map_[i] >= 0) action(static_cast<Eigen::Index>(i), map_[i]);
+  }
+
+  const std::vector<int>& map_;
+  std::optional<fem::SkinGuard> guard_;
+  Eigen::Index count_ = 0;
+};
+
+/// One line on what was mended, and where most.
+void say_what_was_mended(const Character& character, const std::vector<FrameReport>& frames,
+                         const Talk& talk) {
+  const auto most = std::max_element(
+      frames.begin(), frames.end(),
+      [](const FrameReport& a, const FrameReport& b) { return a.mended.largest < b.mended.largest; });
+  if (most == frames.end() || most->mended.vertex < 0) return;
+  const lattice::Surface& surface = character.input.skin.surface;
+  const int joint = lattice::skin_frame(surface.weights[static_cast<std::size_t>(most->mended.vertex)],
+                                        character.lattice.lattice.frame_of_joint);
+  talk(fmt::format(
+      "mended up to {:.2g} % of the skin, where cells are too coarse for it, by at most {:.2g} % of the "
+      "height: "
+      "frame {} at '{}'; --guard off leaves it",
+      100.0 * std::max_element(
+                  frames.begin(), frames.end(),
+                  [](const FrameReport& a, const FrameReport& b) { return a.mended.area < b.mended.area; })
+                  ->mended.area,
+      100.0 * most->mended.largest / character.rig.height, most->frame,
+      joint < 0 ? std::string("the body") : character.input.joints.names[static_cast<std::size_t>(joint)]));
+}
+
 /// Steps through the frames, writes the cache and keeps what the preview shows.
 std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character& character,
                                              const fem::Body& body, fem::Simulation& simulation,
@@ -226,6 +286,7 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
   const std::vector<int> shown = assets::preview_frames(count);
   std::vector<assets::PreviewFrame> preview;
   assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
+  const FrameGuard guard(scene, character);
   Progress progress("simulating", count);
   for (int k = 0; k < count; ++k) {
     const int number = frames.first + k;
@@ -236,6 +297,7 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
     const Points surface = simulation.skin_of(simulation.positions_at(time));
     CharacterFrame frame = frame_at(character, pose, surface);
     if (scene.offset) offset_from_skinning(character, body, pose, time, *scene.offset, frame);
+    const fem::Mended mended = guard.mend(frame);
     try {
       writer.write(layout.apply(frame.simulated));
     } catch (const std::domain_error& error) {
@@ -247,6 +309,7 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
     f.time = time;
     f.steps = step.steps;
     f.measures = simulation.measures_at(time);
+    f.mended = mended;
     f.flipped_triangles = count_flipped_triangles(body, character.input.skin.surface, surface, pose);
     report.frames.push_back(f);
     if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
@@ -316,6 +379,7 @@ void simulate(const Scene& scene, const Talk& talk) {
   const auto preview =
       run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
   lap("simulate and write frames");
+  say_what_was_mended(character, report.frames, talk);
   if (scene.preview == Switch::On) write_picture(character, preview, out.file(kPicture));
   lap("preview");
   report.counts = simulation.counts();

@@ -84,6 +84,7 @@ cells = 500
 tip_bones = "off"
 symmetry = "off"
 coarsen_rigid = "on"
+guard = "off"
 preview = "off"
 levels = 2
 young = 20000
@@ -129,6 +130,7 @@ region = "trunk"
   expected.clip = "walk";
   expected.cells = 500;
   expected.tip_bones = expected.symmetry = expected.preview = Switch::Off;
+  expected.guard = Switch::Off;
   expected.coarsen_rigid = Switch::On;
   expected.sizes = {{{"belly", "hip*"}, 0.5}};
   expected.levels = 2;

@@ -1,0 +1,114 @@
+#include "fem/skin_guard.h"
+
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+namespace sinew::fem {
+namespace {
+
+using lattice::Points;
+
+/// A square sheet of n x n quads of one unit, each split in two.
+struct Sheet {
+  Points points;
+  lattice::Triangles triangles;
+
+  explicit Sheet(int n) : points((n + 1) * (n + 1), 3), triangles(2 * n * n, 3) {
+    for (int y = 0; y <= n; ++y)
+      for (int x = 0; x <= n; ++x) points.row(y * (n + 1) + x) << x, y, 0;
+    Eigen::Index t = 0;
+    for (int y = 0; y < n; ++y)
+      for (int x = 0; x < n; ++x) {
+        const int a = y * (n + 1) + x, b = a + 1, c = a + n + 1, d = c + 1;
+        triangles.row(t++) << a, b, d;
+        triangles.row(t++) << a, d, c;
+      }
+  }
+};
+
+Points turned(const Points& x, double angle) {
+  const Eigen::Matrix3d r =
+      Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  return (x * r.transpose()).rowwise() + Eigen::RowVector3d(5, -3, 2);
+}
+
+/// Longest edge of the sheet's grid lines.
+double longest_edge(const Sheet& sheet, const Points& x) {
+  double longest = 0.0;
+  for (Eigen::Index t = 0; t < sheet.triangles.rows(); ++t)
+    longest = std::max(longest, (x.row(sheet.triangles(t, 0)) - x.row(sheet.triangles(t, 1))).norm());
+  return longest;
+}
+
+TEST(SkinGuard, LeavesRigidMotionAndWholeFleshAsTheyAre) {
+  const Sheet sheet(10);
+  const SkinGuard guard(sheet.points, sheet.triangles);
+  const Points plain = turned(sheet.points, 0.4);
+  // Flesh that lags by a right angle as a whole, and flesh that swells by half.
+  for (const Points& flesh : {turned(sheet.points, 2.0), Points(1.5 * plain)}) {
+    Points skin = flesh;
+    const Mended mended = guard.mend(plain, skin);
+    EXPECT_TRUE(skin == flesh);
+    EXPECT_EQ(mended.vertex, -1);
+    EXPECT_EQ(mended.area, 0.0);
+  }
+}
+
+TEST(SkinGuard, LaysAnOutlierBackAndTellsWhich) {
+  const Sheet sheet(20);
+  const SkinGuard guard(sheet.points, sheet.triangles);
+  const int middle = 10 * 21 + 10;
+  Points skin = sheet.points;
+  skin.row(middle) += Eigen::RowVector3d(0, 0, 4);
+  const Points torn = skin;
+  const Mended mended = guard.mend(sheet.points, skin);
+  EXPECT_EQ(mended.vertex, middle);
+  // All round it agrees with plain skinning, so it goes back to it: what is left is a hundredth of the way.
+  EXPECT_LE(skin.row(middle).z(), 0.04);
+  EXPECT_NEAR(mended.largest, 4.0, 0.04);
+  // Three rings fade, the fourth is not touched: at most 9 x 9 of the 20 x 20 units.
+  EXPECT_GT(mended.area, 0.0);
+  EXPECT_LE(mended.area, 81.0 / 400.0);
+  for (int v = 0; v < skin.rows(); ++v) {
+    const Eigen::RowVector3d way = (sheet.points.row(v) - sheet.points.row(middle)).cwiseAbs();
+    if (way.maxCoeff() > 4.5) {
+      EXPECT_TRUE(skin.row(v) == torn.row(v)) << v;
+    }
+  }
+}
+
+// Half of the sheet has gone with another limb: a tear of 6 units along a line of single edges. What flesh
+// adds to plain skinning becomes a slope over the rings on both sides instead.
+TEST(SkinGuard, SpreadsATear) {
+  const Sheet sheet(24);
+  const SkinGuard guard(sheet.points, sheet.triangles);
+  Points skin = sheet.points;
+  for (Eigen::Index v = 0; v < skin.rows(); ++v)
+    if (skin(v, 0) > 12.5) skin(v, 0) += 6.0;
+  const double before = longest_edge(sheet, skin);
+  guard.mend(sheet.points, skin);
+  EXPECT_NEAR(before, std::hypot(7.0, 1.0), 1e-12);  // a diagonal
+  EXPECT_LE(longest_edge(sheet, skin), 2.5);         // where an eye begins to call skin torn
+}
+
+TEST(SkinGuard, DoesNotPop) {
+  const Sheet sheet(12);
+  const SkinGuard guard(sheet.points, sheet.triangles);
+  const int middle = 6 * 13 + 6;
+  Points last;
+  // In steps of a hundredth the mended place never moves by more than the flesh does.
+  for (double lift = 0.0; lift < 3.0; lift += 0.01) {
+    Points skin = sheet.points;
+    skin(middle, 2) += lift;
+    guard.mend(sheet.points, skin);
+    if (last.rows() > 0) {
+      EXPECT_LE((skin - last).rowwise().norm().maxCoeff(), 0.1) << lift;
+    }
+    last = skin;
+  }
+}
+
+}  // namespace
+}  // namespace sinew::fem
