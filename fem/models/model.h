@@ -93,6 +93,6 @@ std::span<const ModelInfo> models();
 const ModelInfo* find_model(std::string_view name);
 
 /// The name of the model that is used unless another one is asked for.
-inline constexpr std::string_view kDefaultModel = "blended";
+inline constexpr std::string_view kDefaultModel = "blended-stiffness";
 
 }  // namespace sinew::fem

@@ -22,6 +22,7 @@ Points swung(const Body& body, const SolverOptions& solver) {
     return {base};
   };
   SimulationOptions options;
+  options.model = "blended";
   options.solver = solver;
   Simulation simulation(body, motion, 0.0, options);
   EXPECT_EQ(simulation.advance_to(0.5).status, SimulationStatus::Ok);
@@ -79,6 +80,7 @@ TEST(BlendedSolver, InShortStaysCloseToDoubleAndComesToTheSameRest) {
   };
   const auto states = [&](Precision precision) {
     SimulationOptions options;
+    options.model = "blended";
     options.solver.precision = precision;
     Simulation simulation(body, motion, 0.0, options);
     std::vector<Points> at;
@@ -118,6 +120,7 @@ TEST(BlendedSolver, CountsItsUnknowns) {
 TEST(BlendedSolver, DoesNothingToFleshAtRest) {
   const Body body = tests::arm_body(tests::make_arm(), 120 * kDegree);
   SimulationOptions options;
+  options.model = "blended";
   options.gravity.setZero();
   const Motion rest = [](double) { return tests::arm_pose(0.0); };
   for (Integrator integrator : {Integrator::Bdf2, Integrator::BackwardEuler}) {
@@ -142,6 +145,7 @@ TEST(BlendedSolver, FollowsATwistOfTheForearm) {
     const std::vector<std::vector<Eigen::Affine3d>> poses{twist(0.0), twist(M_PI / 2)};
     const Body body = make_body({arm.lattice, arm.skin, arm.skeleton, poses}, options);
     SimulationOptions run;
+    run.model = "blended";
     run.gravity.setZero();
     Simulation simulation(
         body, [&](double time) { return twist(M_PI / 2 * tests::smooth_step(time)); }, 0.0, run);

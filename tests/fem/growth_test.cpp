@@ -41,6 +41,7 @@ Eigen::Affine3d turned_and_scaled(double scale) {
 SimulationReport held(const Body& body, const std::vector<Eigen::Affine3d>& pose, double seconds, Points& x,
                       Measures& measures) {
   SimulationOptions options;
+  options.model = "blended";
   options.gravity.setZero();
   Simulation simulation(
       body, [&](double) { return pose; }, 0.0, options);

@@ -71,6 +71,7 @@ TEST(GridOfCubes, SoftBonesCarryABendingArm) {
 TEST(GridOfCubes, HoldsStillAtRestWithoutGravity) {
   const GridArm grid;
   SimulationOptions options;
+  options.model = "blended";
   options.gravity.setZero();
   Simulation simulation(
       grid.body, [](double) { return tests::arm_pose(0.0); }, 0.0, options);

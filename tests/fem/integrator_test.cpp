@@ -35,6 +35,7 @@ std::vector<Eigen::Affine3d> still(double) { return {Eigen::Affine3d::Identity()
 
 SimulationOptions options_of(double step, Integrator integrator, const Eigen::Vector3d& gravity) {
   SimulationOptions options;
+  options.model = "blended";
   options.step = step;
   options.integrator = integrator;
   options.gravity = gravity;

@@ -119,6 +119,7 @@ ControlLattice part_of(const ControlLattice& lattice, const std::vector<int>& se
 /// The skin after 0.5 s. Not settled: that ends when the whole body is slow, one leg or two.
 Points simulate(const Body& body, const Motion& motion) {
   SimulationOptions options;
+  options.model = "blended";
   options.settle_limit = 0.0;
   Simulation simulation(body, motion, 0.0, options);
   EXPECT_EQ(simulation.settle().status, SimulationStatus::Ok);

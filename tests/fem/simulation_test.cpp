@@ -29,6 +29,7 @@ double largest_distance(const Points& a, const Points& b) { return (a - b).rowwi
 
 SimulationOptions options_of(Integrator integrator, double step = 1.0 / 120.0) {
   SimulationOptions options;
+  options.model = "blended";
   options.integrator = integrator;
   options.step = step;
   return options;
