@@ -6,8 +6,10 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <utility>
 
+#include "assets/detail/loose_joints.h"
 #include "assets/detail/text.h"
 #include "assets/detail/transforms.h"
 #include "assets/error.h"
@@ -26,6 +28,9 @@ constexpr double kSamePose = 1e-3;
 constexpr double kLeaveInPlace = 0.5;
 /// Joints whose scales differ by more are stretched by the pose; rounding stays a thousand times below.
 constexpr double kStretch = 0.01;
+
+/// Entries of an identity that went through text or single precision.
+constexpr double kUnbound = 1e-5;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -77,6 +82,8 @@ class RestFinder {
     result_.rest_from_mesh.assign(scene_.skins.size(), Eigen::Affine3d::Identity());
     resolved_.assign(scene_.nodes.size(), false);
     align_skins();
+    hang_helpers();
+    place_loose_joints();
     complete_tree();
     return std::move(result_);
   }
@@ -124,10 +131,15 @@ class RestFinder {
     return map.matrix().allFinite() && std::abs(map.linear().determinant()) > 1e-30;
   }
 
-  Eigen::Affine3d own_alignment(std::size_t k) const {
+  struct Alignment {
+    Eigen::Affine3d map = Eigen::Affine3d::Identity();
+    bool same_pose = false;  ///< the nodes hold the pose of binding.
+  };
+
+  Alignment own_alignment(std::size_t k) const {
     auto maps = joint_maps(k);
     std::erase_if(maps, [](const auto& map) { return !usable(map.first); });
-    if (maps.empty()) return Eigen::Affine3d::Identity();
+    if (maps.empty()) return {};
     const auto& heaviest = *std::max_element(
         maps.begin(), maps.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
     const double scale = character_scale(maps);
@@ -135,10 +147,10 @@ class RestFinder {
     const bool same_pose = std::all_of(maps.begin(), maps.end(), [&](const auto& map) {
       return distance(map.first, heaviest.first, boxes_[k]) <= kSamePose * size;
     });
-    if (same_pose) return heaviest.first;
+    if (same_pose) return {heaviest.first, true};
     const Eigen::Affine3d guess = similarity(maps, scale, k);
     const std::optional<Eigen::Affine3d>& bound = scene_.skins[k].world_from_mesh;
-    return bound && stands_like(*bound, guess) ? *bound : guess;
+    return {bound && stands_like(*bound, guess) ? *bound : guess, false};
   }
 
   /// The file's word for where the mesh was bound counts where it agrees with the guess in size and rough
@@ -209,67 +221,101 @@ class RestFinder {
     for (const std::size_t k : order) {
       // Skins that no mesh uses may hold leftovers; they decide nothing.
       if (total(k) <= 0.0) continue;
-      result_.rest_from_mesh[k] = align_skin(k);
+      const Alignment own = own_alignment(k);
+      result_.rest_from_mesh[k] = align_skin(k, own);
       const ImportedSkin& skin = scene_.skins[k];
       for (std::size_t j = 0; j < skin.joints.size(); ++j) {
-        if (resolved_[at(skin.joints[j])]) continue;
-        result_.rest_from_node[at(skin.joints[j])] =
-            result_.rest_from_mesh[k] * skin.joint_from_mesh[j].inverse();
-        resolved_[at(skin.joints[j])] = true;
+        const int node = skin.joints[j];
+        if (resolved_[at(node)]) continue;
+        const Eigen::Affine3d bound = result_.rest_from_mesh[k] * skin.joint_from_mesh[j].inverse();
+        if (weights_[k][j] > 0.0) {
+          result_.rest_from_node[at(node)] = bound;
+          resolved_[at(node)] = true;
+        } else if (is_loose_.insert(node).second) {
+          const bool is_unbound = skin.joint_from_mesh[j].isApprox(Eigen::Affine3d::Identity(), kUnbound);
+          loose_.push_back({node, bound, is_unbound, own.same_pose});
+        }
       }
       if (!first_aligned_) first_aligned_ = k;
     }
   }
 
-  Eigen::Affine3d align_skin(std::size_t k) const {
+  /// Through a joint that carries weight in this skin and in an earlier one; `own` where there is none.
+  Eigen::Affine3d align_skin(std::size_t k, const Alignment& own) const {
     const ImportedSkin& skin = scene_.skins[k];
-    double best = -1.0;
+    // The joint with the largest weight here; among those without weight here, with the largest elsewhere.
+    std::pair<double, double> best{-1.0, -1.0};
     std::size_t joint = 0;
     for (std::size_t j = 0; j < skin.joints.size(); ++j) {
-      if (!resolved_[at(skin.joints[j])] || weights_[k][j] <= best) continue;
-      best = weights_[k][j];
+      const std::pair weight{weights_[k][j], result_.weight_of_node[at(skin.joints[j])]};
+      if (!resolved_[at(skin.joints[j])] || weight <= best) continue;
+      best = weight;
       joint = j;
     }
-    if (best >= 0.0) return result_.rest_from_node[at(skin.joints[joint])] * skin.joint_from_mesh[joint];
-    const Eigen::Affine3d own = own_alignment(k);
-    if (!first_aligned_) return own;
-    // Skins without a common joint: bound in the same space if they were turned and scaled alike.
+    if (best.second >= 0.0) {
+      const Eigen::Affine3d shared =
+          result_.rest_from_node[at(skin.joints[joint])] * skin.joint_from_mesh[joint];
+      // No vertex vouches for the matrix of a joint that carries nothing here.
+      const double scale =
+          std::cbrt(std::abs(shared.linear().determinant() / own.map.linear().determinant()));
+      if (best.first > 0.0 || (scale > 0.5 && scale < 2.0)) return shared;
+    }
+    if (!first_aligned_) return own.map;
     const Eigen::Affine3d& first = result_.rest_from_mesh[*first_aligned_];
-    return own.linear().isApprox(first.linear(), kSamePose) ? first : own;
+    // Skins without a common joint: bound in the same space if they were turned and scaled alike.
+    return own.map.linear().isApprox(first.linear(), kSamePose) ? first : own.map;
   }
 
-  /// parent_from_node with what is scaled to nothing in the node pose kept at unit size: a rest frame must be
-  /// invertible, and only nodes without weight get theirs from here.
-  Eigen::Affine3d invertible_local(std::size_t n) const {
-    const ImportedNode& node = scene_.nodes[n];
-    const double volume = std::abs(node.parent_from_node.linear().determinant());
-    if (volume > 1e-12 * std::pow(node.parent_from_node.linear().norm(), 3)) return node.parent_from_node;
-    skeleton::LocalTransform local = node.local;
-    for (int c = 0; c < 3; ++c) {
-      if (std::abs(local.scale[c]) < 1e-6 * std::max(local.scale.cwiseAbs().maxCoeff(), 1e-6))
-        local.scale[c] = 1.0;
+  /// Diagonal of all skins at rest.
+  double size_at_rest() const {
+    Eigen::AlignedBox3d box;
+    for (std::size_t k = 0; k < boxes_.size(); ++k) {
+      for (int i = 0; i < 8 && !boxes_[k].isEmpty(); ++i)
+        box.extend(result_.rest_from_mesh[k] *
+                   boxes_[k].corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
     }
-    return local.matrix();
+    return box.isEmpty() ? 0.0 : box.diagonal().norm();
+  }
+
+  void place_loose_joints() {
+    // A joint may be loose in one skin and carry weight in the next.
+    std::erase_if(loose_, [&](const LooseJoint& joint) { return resolved_[at(joint.node)]; });
+    if (loose_.empty()) return;
+    std::vector<std::optional<Eigen::Affine3d>> placed(scene_.nodes.size());
+    for (std::size_t n = 0; n < placed.size(); ++n) {
+      if (resolved_[n]) placed[n] = result_.rest_from_node[n];
+    }
+    LooseRest rest = hang_loose_joints(scene_, placed, loose_, size_at_rest());
+    for (std::size_t l = 0; l < loose_.size(); ++l) {
+      result_.rest_from_node[at(loose_[l].node)] = rest.rest_from_node[l];
+      resolved_[at(loose_[l].node)] = true;
+    }
+    result_.rehung = std::move(rest.rehung);
   }
 
   /// Gives the parent of a placed node the place from which its child is where it is.
   void hang_on_child(std::size_t child) {
     const int parent = scene_.nodes[child].parent;
-    result_.rest_from_node[at(parent)] = result_.rest_from_node[child] * invertible_local(child).inverse();
+    result_.rest_from_node[at(parent)] =
+        result_.rest_from_node[child] * invertible_local(scene_.nodes[child]).inverse();
     resolved_[at(parent)] = true;
   }
 
-  void complete_tree() {
-    const std::size_t n = scene_.nodes.size();
-    for (std::size_t i = n; i-- > 0;) {
+  void hang_helpers() {
+    for (std::size_t i = scene_.nodes.size(); i-- > 0;) {
       const int parent = scene_.nodes[i].parent;
       if (resolved_[i] && parent >= 0 && scene_.nodes[at(parent)].helper) hang_on_child(i);
     }
+  }
+
+  void complete_tree() {
+    hang_helpers();
+    const std::size_t n = scene_.nodes.size();
     const auto hang_on_parents = [&] {
       for (std::size_t i = 0; i < n; ++i) {
         const int parent = scene_.nodes[i].parent;
         if (resolved_[i] || parent < 0 || !resolved_[at(parent)]) continue;
-        result_.rest_from_node[i] = result_.rest_from_node[at(parent)] * invertible_local(i);
+        result_.rest_from_node[i] = result_.rest_from_node[at(parent)] * invertible_local(scene_.nodes[i]);
         resolved_[i] = true;
       }
     };
@@ -280,7 +326,8 @@ class RestFinder {
       if (resolved_[i]) continue;
       const int parent = scene_.nodes[i].parent;
       result_.rest_from_node[i] =
-          parent < 0 ? invertible_local(i) : result_.rest_from_node[at(parent)] * invertible_local(i);
+          parent < 0 ? invertible_local(scene_.nodes[i])
+                     : result_.rest_from_node[at(parent)] * invertible_local(scene_.nodes[i]);
       resolved_[i] = true;
     }
   }
@@ -290,6 +337,8 @@ class RestFinder {
   std::vector<std::vector<double>> weights_;  ///< per skin and joint.
   std::vector<Eigen::AlignedBox3d> boxes_;    ///< per skin, of its meshes' points.
   std::vector<bool> resolved_;                ///< per node.
+  std::vector<LooseJoint> loose_;             ///< in the order of the skins that name them.
+  std::set<int> is_loose_;                    ///< their nodes.
   std::optional<std::size_t> first_aligned_;
 };
 

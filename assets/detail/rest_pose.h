@@ -18,6 +18,8 @@ struct RestPose {
   std::vector<Eigen::Affine3d> rest_from_mesh;   ///< one per skin: where its meshes' points stand at rest.
   /// Total weight that hangs on each node.
   std::vector<double> weight_of_node;
+  /// Joints without weight whose bind matrices contradict the nodes and did not count.
+  std::vector<int> rehung;
 };
 
 /// `scene` has normalised weights. Method: with W_j the node pose and B_kj the inverse bind matrix of joint j
@@ -26,8 +28,8 @@ struct RestPose {
 /// similarity with the median scale of the T_kj and their mean rotation snapped to the nearest turn of axes;
 /// or the place of binding, where the file tells it (FBX) and it agrees with that in size and rough
 /// direction. Rest joints are R_j = A_k inv(B_kj), so skinning the rest pose reproduces the mesh by
-/// construction within one skin; skins that share joints are aligned through them, and check_rest_pose() sees
-/// whether they agree.
+/// construction within one skin; joints on which nothing hangs are placed by hang_loose_joints(). Skins that
+/// share joints are aligned through them, and check_rest_pose() sees whether they agree.
 RestPose find_rest_pose(const ImportedScene& scene);
 
 /// Skins every mesh at rest with the file's own bind matrices and compares it with its rest points. Throws

@@ -56,6 +56,7 @@ class RigBuilder {
     normalise_weights(scene_);
     rest_ = find_rest_pose(scene_);
     check_rest_pose(rig_.file, scene_, rest_);
+    report_rehung();
     choose_joints();
     make_parts();
     find_units();
@@ -75,6 +76,20 @@ class RigBuilder {
   }
 
   // ---- joints
+
+  void report_rehung() {
+    constexpr std::size_t kNamed = 3;
+    if (rest_.rehung.empty()) return;
+    std::string named;
+    for (std::size_t i = 0; i < std::min(rest_.rehung.size(), kNamed); ++i)
+      named += (i > 0 ? ", '" : "'") + printable(name_of(scene_, rest_.rehung[i])) + "'";
+    if (rest_.rehung.size() > kNamed)
+      named += " and " + std::to_string(rest_.rehung.size() - kNamed) + " more";
+    find(Finding::Severity::Warning, "bind-matrix-ignored", "",
+         "joints without weight (" + named +
+             ") have bind matrices that contradict their nodes; they rest where the nodes have them",
+         "bind the skin again, or export its deforming joints only");
+  }
 
   bool animated(std::size_t node) const {
     return std::any_of(scene_.clips.begin(), scene_.clips.end(), [&](const skeleton::Clip& clip) {
