@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -236,7 +237,10 @@ class RestFinder {
           loose_.push_back({node, bound, is_unbound, own.same_pose});
         }
       }
-      if (!first_aligned_) first_aligned_ = k;
+      if (!first_aligned_) {
+        first_aligned_ = k;
+        first_in_same_pose_ = own.same_pose;
+      }
     }
   }
 
@@ -262,7 +266,12 @@ class RestFinder {
     }
     if (!first_aligned_) return own.map;
     const Eigen::Affine3d& first = result_.rest_from_mesh[*first_aligned_];
-    // Skins without a common joint: bound in the same space if they were turned and scaled alike.
+    // Skins without a common joint stand where the nodes have them, if these hold the pose of binding.
+    if (own.same_pose && first_in_same_pose_) {
+      const double size = std::cbrt(std::abs(first.linear().determinant())) * boxes_[k].diagonal().norm();
+      return distance(own.map, first, boxes_[k]) <= kSamePose * size ? first : own.map;
+    }
+    // Otherwise they were bound in the same space if they were turned and scaled alike.
     return own.map.linear().isApprox(first.linear(), kSamePose) ? first : own.map;
   }
 
@@ -340,6 +349,7 @@ class RestFinder {
   std::vector<LooseJoint> loose_;             ///< in the order of the skins that name them.
   std::set<int> is_loose_;                    ///< their nodes.
   std::optional<std::size_t> first_aligned_;
+  bool first_in_same_pose_ = false;
 };
 
 /// The up to three things with the largest error, worst first.
@@ -362,6 +372,37 @@ std::string worst_three(const std::vector<double>& errors, double limit, const N
 }  // namespace
 
 RestPose find_rest_pose(const ImportedScene& scene) { return RestFinder(scene).run(); }
+
+void check_crowd(const std::string& file, const ImportedScene& scene, const RestPose& rest) {
+  const auto first_joint = [&](const ImportedInstance& instance) {
+    return "'" + printable(name_of(scene, scene.skins[at(instance.skin)].joints.front())) + "'";
+  };
+  // First instance of every mesh with each skin, by mesh.
+  std::map<int, std::vector<const ImportedInstance*>> bodies;
+  for (const ImportedInstance& instance : scene.instances) {
+    if (instance.skin < 0) continue;
+    const lattice::Points& points = scene.meshes[at(instance.mesh)].points;
+    std::vector<const ImportedInstance*>& of_mesh = bodies[instance.mesh];
+    const auto has_this_skin = [&](const ImportedInstance* other) { return other->skin == instance.skin; };
+    if (std::any_of(of_mesh.begin(), of_mesh.end(), has_this_skin)) continue;
+    const std::vector<int>& joints = scene.skins[at(instance.skin)].joints;
+    for (const ImportedInstance* other : of_mesh) {
+      const std::vector<int>& others = scene.skins[at(other->skin)].joints;
+      if (std::find_first_of(joints.begin(), joints.end(), others.begin(), others.end()) != joints.end())
+        continue;
+      const Eigen::AlignedBox3d box = box_of(points);
+      const Eigen::Affine3d& map = rest.rest_from_mesh[at(instance.skin)];
+      const double size = (map.linear() * box.diagonal()).norm();
+      if (distance(map, rest.rest_from_mesh[at(other->skin)], box) > kSamePose * size) continue;
+      throw InputError(file, "mesh '" + printable(scene.meshes[at(instance.mesh)].name) +
+                                 "': is bound to the skeletons of " + first_joint(*other) + " and " +
+                                 first_joint(instance) +
+                                 ", which rest in one place, expected one; hint: export every character to a "
+                                 "file of its own");
+    }
+    of_mesh.push_back(&instance);
+  }
+}
 
 void check_rest_pose(const std::string& file, const ImportedScene& scene, const RestPose& rest) {
   Eigen::AlignedBox3d box;

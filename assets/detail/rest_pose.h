@@ -32,6 +32,9 @@ struct RestPose {
 /// share joints are aligned through them, and check_rest_pose() sees whether they agree.
 RestPose find_rest_pose(const ImportedScene& scene);
 
+/// Throws InputError where one mesh is bound to two skeletons that rest in the same place: two bodies in one.
+void check_crowd(const std::string& file, const ImportedScene& scene, const RestPose& rest);
+
 /// Skins every mesh at rest with the file's own bind matrices and compares it with its rest points. Throws
 /// InputError naming the worst joints and parts where the distance exceeds 1e-4 of the diagonal of all
 /// skinned points.

@@ -55,6 +55,7 @@ class RigBuilder {
     rig_.up_axis = scene_.up_axis;
     normalise_weights(scene_);
     rest_ = find_rest_pose(scene_);
+    check_crowd(rig_.file, scene_, rest_);
     check_rest_pose(rig_.file, scene_, rest_);
     report_rehung();
     choose_joints();

@@ -243,6 +243,48 @@ TEST(BuildRig, RefusesSkinsThatWereBoundInDifferentPoses) {
   }
 }
 
+/// The worm once more, on a skeleton of its own that stands at `place`.
+ImportedScene two_worms(const Eigen::Vector3d& place, Random& random) {
+  ImportedScene scene = worm(4, Eigen::Affine3d::Identity(), random);
+  const int first = static_cast<int>(scene.nodes.size());
+  ImportedSkin skin = scene.skins[0];
+  for (int n = 0; n < first; ++n) {
+    ImportedNode node = scene.nodes[static_cast<std::size_t>(n)];
+    node.name += "_b";
+    if (node.parent >= 0) node.parent += first;
+    if (node.parent < 0) node.local.translation = place;
+    node.parent_from_node = node.local.matrix();
+    scene.nodes.push_back(node);
+  }
+  for (int& joint : skin.joints) joint += first;
+  scene.skins.push_back(skin);
+  scene.instances.push_back({first, 0, 1});
+  return scene;
+}
+
+TEST(BuildRig, MakesTwoBodiesOfOneMeshOnTwoSkeletons) {
+  Random random(20030);
+  const Eigen::Vector3d place(1.0, 0.0, 0.5);
+  const Rig rig = build_rig("worms", two_worms(place, random), {});
+  ASSERT_EQ(rig.parts.size(), 2u);
+  EXPECT_LT(((rig.parts[0].points.rowwise() + place.transpose()) - rig.parts[1].points).norm(), 1e-12);
+  for (const auto& map : skeleton::pose_from_rest(rig.skeleton, skeleton::node_pose(rig.skeleton)))
+    EXPECT_TRUE(map.isApprox(Eigen::Affine3d::Identity(), 1e-12));
+}
+
+TEST(BuildRig, RefusesTwoSkeletonsOfOneMeshInOnePlace) {
+  Random random(20031);
+  try {
+    build_rig("worms", two_worms({0, 0, 0}, random), {});
+    FAIL() << "accepted";
+  } catch (const InputError& e) {
+    EXPECT_STREQ(
+        e.what(),
+        "worms: mesh 'worm': is bound to the skeletons of 'joint0' and 'joint0_b', which rest in one "
+        "place, expected one; hint: export every character to a file of its own");
+  }
+}
+
 TEST(BuildRig, HangsRigidPartsOnTheJointAboveThem) {
   Random random(20027);
   ImportedScene scene = worm(3, Eigen::Affine3d::Identity(), random);
