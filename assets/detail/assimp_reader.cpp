@@ -114,6 +114,8 @@ class AssimpReader {
     } else {
       scene_.format = extension.size() > 1 ? extension.substr(1) : "unknown";
       for (char& c : scene_.format) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+      // Valve's formats stand on Z, and assimp leaves them so.
+      if (extension == ".smd" || extension == ".vta") scene_.up_axis = UpAxis::Z;
     }
   }
 

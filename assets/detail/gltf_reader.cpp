@@ -29,6 +29,7 @@ class GltfReader {
   ImportedScene run() {
     scene_.format = "glTF 2.0";
     scene_.metres_per_unit = 1.0;
+    scene_.unit_by_standard = true;
     scene_.file_vertex_order = true;
     accessors_.check_all();
     order_nodes();

@@ -53,6 +53,7 @@ struct ImportedInstance {
 struct ImportedScene {
   std::string format;            ///< "glTF 2.0", "FBX", ...
   double metres_per_unit = 0.0;  ///< as the file declares it; 0 where it does not.
+  bool unit_by_standard = false;  ///< the format itself fixes that unit.
   UpAxis up_axis = UpAxis::Y;
   bool file_vertex_order = false;
   std::vector<ImportedNode> nodes;  ///< parents before children.

@@ -246,30 +246,28 @@ class RigBuilder {
 
   // ---- units
 
-  /// Extent along the file's up axis of what is simulated, else of any part, else of the joints.
-  double height_in_file_units() const {
-    const int up = static_cast<int>(scene_.up_axis);
-    Eigen::AlignedBox1d flesh, any, joints;
-    const auto extend = [](Eigen::AlignedBox1d& box, double value) {
-      box.extend(Eigen::Matrix<double, 1, 1>(value));
-    };
+  /// Extents of what is simulated, else of any part, else of the joints.
+  BodySize size_in_file_units() const {
+    Eigen::AlignedBox3d flesh, any, joints;
     for (const Part& part : rig_.parts) {
       for (Eigen::Index v = 0; v < part.points.rows(); ++v) {
-        extend(any, part.points(v, up));
-        if (part.role == PartRole::Simulated) extend(flesh, part.points(v, up));
+        any.extend(part.points.row(v).transpose());
+        if (part.role == PartRole::Simulated) flesh.extend(part.points.row(v).transpose());
       }
     }
     for (std::size_t i = 0; i < scene_.nodes.size(); ++i) {
-      if (keep_[i]) extend(joints, rest_.rest_from_node[i].translation()[up]);
+      if (keep_[i]) joints.extend(rest_.rest_from_node[i].translation());
     }
-    const Eigen::AlignedBox1d& box = !flesh.isEmpty() ? flesh : !any.isEmpty() ? any : joints;
-    return box.isEmpty() ? 0.0 : box.sizes()[0];
+    const Eigen::AlignedBox3d& box = !flesh.isEmpty() ? flesh : !any.isEmpty() ? any : joints;
+    if (box.isEmpty()) return {};
+    return {box.sizes()[static_cast<int>(scene_.up_axis)], box.sizes().maxCoeff()};
   }
 
   void find_units() {
-    const double height = height_in_file_units();
-    rig_.metres_per_unit = metres_per_unit(height, scene_.metres_per_unit, options_.height, rig_.findings);
-    rig_.height = height * rig_.metres_per_unit;
+    const BodySize size = size_in_file_units();
+    rig_.metres_per_unit = metres_per_unit(size, {scene_.metres_per_unit, scene_.unit_by_standard},
+                                           options_.height, rig_.findings);
+    rig_.height = size.height * rig_.metres_per_unit;
     turn_ = y_up_from(scene_.up_axis);
     rig_.rig_from_file.setIdentity();
     rig_.rig_from_file.linear() = rig_.metres_per_unit * turn_;

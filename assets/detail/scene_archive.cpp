@@ -218,6 +218,7 @@ template <typename A>
 void exchange(A& a, ImportedScene& v) {
   exchange(a, v.format);
   exchange(a, v.metres_per_unit);
+  exchange(a, v.unit_by_standard);
   exchange_enum(a, v.up_axis, UpAxis::Z);
   exchange(a, v.file_vertex_order);
   exchange(a, v.nodes);

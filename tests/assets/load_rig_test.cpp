@@ -1,9 +1,11 @@
 // What happens before and around the importers: files that are not files, and importers that die.
+#include <array>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -205,6 +207,26 @@ TEST(SceneArchive, CutOrChangedAtAnyByteIsRefusedOrHarmless) {
       EXPECT_STRNE(e.what(), "") << i;
     }
   }
+}
+
+TEST(LoadRig, StandsValvesModelsUp) {
+  // A tetrahedron 1 high on two joints one above the other, along z as that format has it.
+  std::string smd = "version 1\nnodes\n0 \"root\" -1\n1 \"tip\" 0\nend\nskeleton\n";
+  for (const char* turn : {"0", "0.5"})
+    smd += std::string("time ") + (*turn == '0' && turn[1] == 0 ? "0" : "30") +
+           "\n0 0 0 0 0 0 0\n1 0 0 0.5 " + turn + " 0 0\n";
+  smd += "end\ntriangles\n";
+  const std::array<std::string, 4> corner{"0 0 0 0", "0 0.5 0 0", "0 0 0.25 0", "1 0 0 1"};
+  for (const auto& t : std::vector<std::array<std::size_t, 3>>{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}) {
+    smd += "skin\n";
+    for (const std::size_t c : t) smd += corner[c] + " 0 0 1 0 0\n";
+  }
+  const Rig rig = load_rig(write_file("worm.smd", smd + "end\n"), {0.0, SINEW_IMPORTER});
+  EXPECT_EQ(rig.up_axis, UpAxis::Z);
+  EXPECT_NEAR(rig.height, 1.0, 1e-6);  // single precision
+  const int tip = rig.skeleton.find("tip");
+  ASSERT_GE(tip, 0);
+  EXPECT_NEAR(rig.skeleton.joint(tip).rest_from_joint.translation().y(), 0.5, 1e-6);
 }
 
 TEST(Printable, KeepsWordsOfEveryLanguageAndEscapesTheRest) {

@@ -376,22 +376,36 @@ TEST(Weights, MissingEverywhereMakeTheMeshFollowItsNode) {
   EXPECT_EQ(scene.findings[0].code, "weights-missing");
 }
 
-TEST(Units, AreTheFirstFactorThatMakesTheHeightPlausible) {
-  const auto guess = [](double height, double declared) {
+TEST(Units, AreTheFirstFactorThatMakesTheLongestSidePlausible) {
+  const auto guess = [](double longest, double declared) {
     std::vector<Finding> findings;
-    return metres_per_unit(height, declared, 0.0, findings);
+    const double metres = metres_per_unit({0.5 * longest, longest}, {declared, false}, 0.0, findings);
+    // A word wherever the file's own is not taken.
+    EXPECT_EQ(findings.empty(), metres == declared) << longest;
+    return metres;
   };
   EXPECT_EQ(guess(1.8, 1.0), 1.0);
   EXPECT_EQ(guess(180.0, 0.01), 0.01);
   EXPECT_EQ(guess(1.8, 0.01), 1.0);     // says centimetres, but is in metres
   EXPECT_EQ(guess(79.0, 1.0), 0.01);    // says metres, but is in centimetres
-  EXPECT_EQ(guess(9.15, 1.0), 0.0254);  // 0.01 would make it 9 cm
+  EXPECT_EQ(guess(9.15, 0.0), 0.0254);  // 0.01 would make it 9 cm
   EXPECT_EQ(guess(1800.0, 0.0), 1e-3);
   EXPECT_EQ(guess(0.04, 0.0), 10.0);
   EXPECT_EQ(guess(6.9e5, 0.0), 1e-6);  // 0.69 m; 1e-5 would make it 6.9 m
-  EXPECT_EQ(guess(0.0, 0.01), 0.01);
   std::vector<Finding> findings;
-  EXPECT_EQ(metres_per_unit(50.0, 1.0, 2.0, findings), 0.04);
+  EXPECT_EQ(metres_per_unit({50.0, 80.0}, {1.0, false}, 2.0, findings), 0.04);
+  EXPECT_EQ(metres_per_unit({0.0, 0.0}, {0.01, false}, 0.0, findings), 0.01);
+}
+
+TEST(Units, OfAStandardAreBelievedFromABeeToAGiant) {
+  const auto metres = [](double longest) {
+    std::vector<Finding> findings;
+    // A wing that lies is hardly tall.
+    return metres_per_unit({0.05 * longest, longest}, {1.0, true}, 0.0, findings);
+  };
+  for (const double longest : {0.011, 0.2, 1.0, 12.0, 99.0}) EXPECT_EQ(metres(longest), 1.0) << longest;
+  EXPECT_EQ(metres(0.009), 100.0);
+  EXPECT_EQ(metres(155.0), 0.01);
 }
 
 TEST(Units, TurnsKeepTheFrameRightHanded) {
