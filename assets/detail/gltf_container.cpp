@@ -62,6 +62,8 @@ class ContainerReader {
     check_version(document);
     check_extensions(document);
     check_numbers(document, "");
+    take_uncompressed(document);
+    spell_out_defaults(document);
     for (const char* unused : {"images", "textures", "materials", "samplers", "cameras", "extensions",
                                "extensionsUsed", "extensionsRequired"}) {
       document.erase(unused);
@@ -179,6 +181,79 @@ class ContainerReader {
       refuse("/extensionsRequired: extension '" + printable(name) + "' is not supported; hint: " +
              (compressed ? "export again with mesh compression switched off" : "export again without it"));
     }
+  }
+
+  /// Compression that is not required may stand beside plain data, which is then taken; where it stands alone
+  /// it is refused by its name, before anyone looks for the data.
+  void take_uncompressed(json& document) const {
+    static constexpr const char* kDraco = "KHR_draco_mesh_compression";
+    static constexpr const char* kMeshopt = "EXT_meshopt_compression";
+    const auto refuse_compressed = [&](const std::string& path, const char* name) {
+      refuse(path + ": extension '" + name +
+             "' is not supported; hint: export again with mesh compression switched off");
+    };
+    const auto is_plain = [&](const json& accessor) {
+      const json* found = element(document, "accessors", accessor);
+      return found == nullptr || found->contains("bufferView") || found->contains("sparse");
+    };
+    for_each(document, "meshes", [&](json& mesh, const std::string& mesh_path) {
+      for_each(mesh, "primitives", [&](json& primitive, const std::string& path) {
+        const auto extensions = primitive.find("extensions");
+        if (extensions == primitive.end() || !extensions->is_object() || !extensions->contains(kDraco))
+          return;
+        bool plain = !primitive.contains("indices") || is_plain(primitive["indices"]);
+        if (const auto attributes = primitive.find("attributes");
+            attributes != primitive.end() && attributes->is_object()) {
+          for (const json& accessor : *attributes) plain = plain && is_plain(accessor);
+        }
+        if (!plain) refuse_compressed(mesh_path + path, kDraco);
+        extensions->erase(kDraco);
+      });
+    });
+    for_each(document, "bufferViews", [&](json& view, const std::string& path) {
+      const auto extensions = view.find("extensions");
+      if (extensions == view.end() || !extensions->is_object() || !extensions->contains(kMeshopt)) return;
+      const json* buffer = view.contains("buffer") ? element(document, "buffers", view["buffer"]) : nullptr;
+      // A fallback buffer without a URI is a promise that whoever reads the file decompresses it.
+      if (buffer != nullptr && buffer->contains("extensions") && !buffer->contains("uri"))
+        refuse_compressed(path, kMeshopt);
+    });
+  }
+
+  /// What glTF lets a file leave out and the parser wants to see.
+  static void spell_out_defaults(json& document) {
+    // Without inverse bind matrices they are the identity.
+    for_each(document, "skins", [](json& skin, const std::string&) {
+      if (!skin.contains("inverseBindMatrices")) skin["inverseBindMatrices"] = -1;
+    });
+    // Without a node the target belongs to an extension.
+    for_each(document, "animations", [](json& animation, const std::string&) {
+      for_each(animation, "channels", [](json& channel, const std::string&) {
+        const auto target = channel.find("target");
+        if (target == channel.end() || !target->is_object()) return;
+        if (!target->contains("node")) (*target)["node"] = -1;
+        if (!target->contains("path")) (*target)["path"] = "";
+      });
+    });
+  }
+
+  /// Calls `visit(object, "/name/index")` for every object of the array `name` in `parent`, where there is
+  /// one.
+  template <typename Visit>
+  static void for_each(json& parent, const char* name, const Visit& visit) {
+    const auto list = parent.find(name);
+    if (list == parent.end() || !list->is_array()) return;
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      if ((*list)[i].is_object()) visit((*list)[i], "/" + std::string(name) + "/" + std::to_string(i));
+    }
+  }
+
+  /// The object that an index points to; null where there is none, which is for others to complain about.
+  static const json* element(const json& document, const char* name, const json& index) {
+    const auto list = document.find(name);
+    if (list == document.end() || !list->is_array() || !index.is_number_unsigned()) return nullptr;
+    const auto i = index.get<std::size_t>();
+    return i < list->size() && (*list)[i].is_object() ? &(*list)[i] : nullptr;
   }
 
   /// Whole numbers must fit what they are read into later: sizes and offsets 2^53, everything else an int.

@@ -193,11 +193,6 @@ class GltfReader {
     for (std::size_t p = 0; p < mesh.primitives.size(); ++p) {
       const tinygltf::Primitive& primitive = mesh.primitives[p];
       const std::string path = "/meshes/" + std::to_string(m) + "/primitives/" + std::to_string(p);
-      if (primitive.extensions.count("KHR_draco_mesh_compression") != 0) {
-        refuse(path +
-               ": extension 'KHR_draco_mesh_compression' is not supported; hint: export again with mesh "
-               "compression switched off");
-      }
       num_morph_targets_ += primitive.targets.size();
       const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
       if (mode < TINYGLTF_MODE_TRIANGLES) {

@@ -60,6 +60,25 @@ INSTANTIATE_TEST_SUITE_P(
                "/extensionsRequired: extension 'EXT_meshopt_compression' is not supported; hint: export "
                "again with "
                "mesh compression switched off"},
+        Broken{
+            "draco that is not required, alone",
+            [](TinyGltf& g) {
+              g.primitive()["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
+              g.document["accessors"][TinyGltf::kIndices].erase("bufferView");
+            },
+            "/meshes/0/primitives/0: extension 'KHR_draco_mesh_compression' is not supported; hint: export "
+            "again with mesh compression switched off"},
+        Broken{
+            "meshopt that is not required, alone",
+            [](TinyGltf& g) {
+              g.document["buffers"] = {
+                  {{"byteLength", 320}},
+                  {{"byteLength", 900}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}}};
+              g.document["bufferViews"][2]["buffer"] = 1;
+              g.document["bufferViews"][2]["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0}};
+            },
+            "/bufferViews/2: extension 'EXT_meshopt_compression' is not supported; hint: export again with "
+            "mesh compression switched off"},
         Broken{"unknown extension", [](TinyGltf& g) { g.document["extensionsRequired"] = {"ACME_bones"}; },
                "/extensionsRequired: extension 'ACME_bones' is not supported; hint: export again without it"},
         Broken{"count of 2^31 - 1", [](TinyGltf& g) { g.document["accessors"][0]["count"] = 2147483647; },

@@ -172,6 +172,25 @@ TEST(GltfReader, LeavesOutMorphTargetsPointsAndLinesWithAWord) {
   EXPECT_TRUE(has_finding(rig, "lines-ignored"));
 }
 
+TEST(GltfReader, TakesTheIdentityWhereASkinStatesNoBindMatrices) {
+  TinyGltf gltf;
+  gltf.document["skins"].push_back({{"joints", {0}}});  // one that no mesh uses
+  EXPECT_EQ(rig_of(gltf).parts[0].points, rig_of(TinyGltf()).parts[0].points);
+  gltf.document["skins"][0].erase("inverseBindMatrices");
+  gltf.document["nodes"][1].erase("translation");  // where the identity has it
+  const Rig rig = rig_of(gltf);
+  EXPECT_EQ(rig.parts[0].points, rig_of(TinyGltf()).parts[0].points);
+  for (const skeleton::Joint& joint : rig.skeleton.joints())
+    EXPECT_TRUE(joint.rest_from_joint.isApprox(Eigen::Affine3d::Identity(), kEps)) << joint.name;
+}
+
+TEST(GltfReader, TakesPlainDataThatStandsBesideCompressedData) {
+  TinyGltf gltf;
+  gltf.primitive()["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
+  gltf.document["extensionsUsed"] = {"KHR_draco_mesh_compression"};
+  EXPECT_EQ(rig_of(gltf).parts[0].points, rig_of(TinyGltf()).parts[0].points);
+}
+
 TEST(GltfReader, LeavesOutMeshesOfOtherScenes) {
   TinyGltf gltf;
   gltf.document["nodes"].push_back({{"name", "elsewhere"}, {"mesh", 0}});
