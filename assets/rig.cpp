@@ -183,6 +183,9 @@ int choose_clip(const Rig& rig, const std::string& name) {
     for (std::size_t i = 0; i < rig.clips.size(); ++i) {
       if (rig.clips[i].name == name) return static_cast<int>(i);
     }
+    for (const FaultyClip& faulty : rig.faulty_clips) {
+      if (faulty.name == name) throw InputError(rig.file, faulty.reason);
+    }
     throw ConfigError(rig.file + ": clip '" + name + "': not in the file, which has " + list_of_clips(rig) +
                       "; hint: name one of these, or none for the first that moves");
   }

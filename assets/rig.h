@@ -40,6 +40,13 @@ struct Part {
   int joint = -1;  ///< Rigid: the joint it follows.
 };
 
+/// A clip of the file that cannot be played.
+struct FaultyClip {
+  std::string name;
+  std::string reason;  ///< what is wrong and the remedy, one line without the file.
+  int index = 0;       ///< its place among all clips of the file.
+};
+
 enum class UpAxis { X, Y, Z };
 
 /// A character as plain values: SI units, right-handed, Y up, skeleton rest = bind pose.
@@ -49,6 +56,7 @@ struct Rig {
   std::vector<Part> parts;
   skeleton::Skeleton skeleton;
   std::vector<skeleton::Clip> clips;
+  std::vector<FaultyClip> faulty_clips;  ///< left out of `clips`.
   double metres_per_unit = 1.0;  ///< file units were multiplied by this.
   UpAxis up_axis = UpAxis::Y;    ///< of the file.
   /// rig_from_file: file world coordinates (units, axes) to the rig's; a similarity. Outputs in file space
@@ -95,7 +103,8 @@ struct LoadOptions {
 Rig load_rig(const std::string& file, const LoadOptions& options = {});
 
 /// Index of the clip taken when none is named: the first with at least two distinct keys and a duration > 0.
-/// Throws ConfigError when `name` is given and absent (listing the clips), InputError when no clip is usable.
+/// Throws ConfigError when `name` is given and absent (listing the clips), InputError when it
+/// is faulty or no clip is usable.
 int choose_clip(const Rig& rig, const std::string& name);
 
 }  // namespace sinew::assets

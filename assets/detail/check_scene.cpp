@@ -1,5 +1,7 @@
 #include <cmath>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "assets/detail/imported_scene.h"
 #include "assets/detail/text.h"
@@ -21,14 +23,14 @@ bool in_range(int index, std::size_t size) { return index >= 0 && static_cast<st
 /// One file under examination: gathers what every message needs.
 class Checker {
  public:
-  Checker(const std::string& file, const ImportedScene& scene) : file_(file), scene_(scene) {}
+  Checker(const std::string& file, ImportedScene& scene) : file_(file), scene_(scene) {}
 
   void run() {
     for (std::size_t n = 0; n < scene_.nodes.size(); ++n) check_node(n);
     for (std::size_t s = 0; s < scene_.skins.size(); ++s) check_skin(s);
     for (std::size_t m = 0; m < scene_.meshes.size(); ++m) check_mesh(m);
     for (const ImportedInstance& instance : scene_.instances) check_instance(instance);
-    for (std::size_t c = 0; c < scene_.clips.size(); ++c) check_clip(c);
+    set_faulty_clips_aside();
   }
 
  private:
@@ -192,9 +194,26 @@ class Checker {
     }
   }
 
-  void check_clip(std::size_t c) const {
-    const skeleton::Clip& clip = scene_.clips[c];
-    const std::string thing = quoted("clip", clip.name, c);
+  void set_faulty_clips_aside() {
+    std::set<int> known;
+    for (const FaultyClip& faulty : scene_.faulty_clips) known.insert(faulty.index);
+    std::vector<skeleton::Clip> good;
+    int index = -1;
+    for (skeleton::Clip& clip : scene_.clips) {
+      while (known.contains(++index)) continue;
+      try {
+        check_clip(clip, index);
+        good.push_back(std::move(clip));
+      } catch (const InputError& e) {
+        scene_.faulty_clips.push_back({clip.name, without_file(file_, e.what()), index});
+      }
+    }
+    scene_.clips = std::move(good);
+    if (scene_.clips.empty() && !scene_.faulty_clips.empty()) refuse(scene_.faulty_clips.front().reason);
+  }
+
+  void check_clip(const skeleton::Clip& clip, int index) const {
+    const std::string thing = quoted("clip", clip.name, static_cast<std::size_t>(index));
     std::vector<bool> seen(scene_.nodes.size(), false);
     for (const skeleton::Channel& channel : clip.channels) {
       if (!in_range(channel.joint, scene_.nodes.size())) {
@@ -212,7 +231,7 @@ class Checker {
   }
 
   const std::string& file_;
-  const ImportedScene& scene_;
+  ImportedScene& scene_;
 };
 
 }  // namespace
@@ -222,6 +241,6 @@ std::string name_of(const ImportedScene& scene, int node) {
   return name.empty() ? "node " + std::to_string(node) : name;
 }
 
-void check_scene(const std::string& file, const ImportedScene& scene) { Checker(file, scene).run(); }
+void check_scene(const std::string& file, ImportedScene& scene) { Checker(file, scene).run(); }
 
 }  // namespace sinew::assets::detail

@@ -37,7 +37,7 @@ class GltfReader {
     for (std::size_t s = 0; s < model_.skins.size(); ++s) read_skin(s);
     for (std::size_t m = 0; m < model_.meshes.size(); ++m) read_mesh(m);
     place_instances();
-    for (std::size_t a = 0; a < model_.animations.size(); ++a) read_animation(a);
+    for (std::size_t a = 0; a < model_.animations.size(); ++a) try_animation(a);
     report_what_was_left_out();
     return std::move(scene_);
   }
@@ -317,25 +317,37 @@ class GltfReader {
 
   // ---- animations
 
-  void read_animation(std::size_t a) {
+  /// One faulty clip of several is no reason to do without the others.
+  void try_animation(std::size_t a) {
+    const std::string& name = model_.animations[a].name;
+    try {
+      scene_.clips.push_back(read_animation(a));
+    } catch (const InputError& e) {
+      const std::string clip = name.empty() ? "clip " + std::to_string(a) : "clip '" + printable(name) + "'";
+      scene_.faulty_clips.push_back({name, clip + ": " + without_file(file_, e.what()), static_cast<int>(a)});
+    }
+  }
+
+  skeleton::Clip read_animation(std::size_t a) {
     const tinygltf::Animation& animation = model_.animations[a];
     const std::string path = "/animations/" + std::to_string(a);
     skeleton::Clip clip;
     clip.name = animation.name;
+    std::vector<std::string> foreign;
     std::map<int, skeleton::Channel> channels;
     for (std::size_t c = 0; c < animation.channels.size(); ++c) {
       const tinygltf::AnimationChannel& channel = animation.channels[c];
       const std::string user = path + "/channels/" + std::to_string(c);
-      check_index(user + "/sampler", channel.sampler, animation.samplers);
       if (channel.target_path == "weights") {
         ++num_morph_channels_;
         continue;
       }
       // Without a node the target belongs to an extension.
       if (channel.target_node < 0) {
-        ++num_foreign_channels_;
+        foreign.push_back(foreign_target(channel, c));
         continue;
       }
+      check_index(user + "/sampler", channel.sampler, animation.samplers);
       check_index(user + "/target/node", channel.target_node, model_.nodes);
       const int node = new_index_[static_cast<std::size_t>(channel.target_node)];
       skeleton::Channel& out = channels[node];
@@ -344,7 +356,30 @@ class GltfReader {
                    path + "/samplers/" + std::to_string(channel.sampler), channel.target_path, user, out);
     }
     for (auto& [node, channel] : channels) clip.channels.push_back(std::move(channel));
-    scene_.clips.push_back(std::move(clip));
+    report_foreign(clip.name, foreign);
+    return clip;
+  }
+
+  /// "channel 2 (KHR_animation_pointer '/materials/0/emissiveFactor')".
+  static std::string foreign_target(const tinygltf::AnimationChannel& channel, std::size_t c) {
+    std::string what = "channel " + std::to_string(c);
+    if (channel.target_extensions.empty()) return what;
+    const auto& [name, value] = *channel.target_extensions.begin();
+    what += " (" + printable(name);
+    if (value.Has("pointer") && value.Get("pointer").IsString())
+      what += " '" + printable(value.Get("pointer").Get<std::string>()) + "'";
+    return what + ")";
+  }
+
+  void report_foreign(const std::string& clip, const std::vector<std::string>& foreign) {
+    constexpr std::size_t kNamed = 3;
+    if (foreign.empty()) return;
+    std::string named;
+    for (std::size_t i = 0; i < std::min(foreign.size(), kNamed); ++i)
+      named += (i > 0 ? ", " : "") + foreign[i];
+    if (foreign.size() > kNamed) named += " and " + std::to_string(foreign.size() - kNamed) + " more";
+    scene_.findings.push_back({Finding::Severity::Warning, "channels-ignored", printable(clip),
+                               named + ": no node is animated there; left out", ""});
   }
 
   void read_channel(const tinygltf::AnimationSampler& sampler, const std::string& path,
@@ -432,7 +467,6 @@ class GltfReader {
     note("lines-ignored", num_line_sets_, "primitives of lines only are left out");
     note("morph-targets-ignored", num_morph_targets_ + num_morph_channels_,
          "morph targets and their channels are left out: the mesh is taken without them");
-    note("channels-ignored", num_foreign_channels_, "animation channels name no node and are left out");
   }
 
   const std::string& file_;
@@ -444,7 +478,6 @@ class GltfReader {
   std::vector<std::size_t> order_;                     ///< ours to the file's.
   std::map<std::size_t, std::vector<int>> meshes_of_;  ///< glTF mesh to its primitives among scene_.meshes.
   std::size_t num_point_sets_ = 0, num_line_sets_ = 0, num_morph_targets_ = 0, num_morph_channels_ = 0;
-  std::size_t num_foreign_channels_ = 0;
 };
 
 }  // namespace

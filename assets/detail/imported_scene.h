@@ -51,8 +51,8 @@ struct ImportedInstance {
 };
 
 struct ImportedScene {
-  std::string format;            ///< "glTF 2.0", "FBX", ...
-  double metres_per_unit = 0.0;  ///< as the file declares it; 0 where it does not.
+  std::string format;             ///< "glTF 2.0", "FBX", ...
+  double metres_per_unit = 0.0;   ///< as the file declares it; 0 where it does not.
   bool unit_by_standard = false;  ///< the format itself fixes that unit.
   UpAxis up_axis = UpAxis::Y;
   bool file_vertex_order = false;
@@ -61,13 +61,16 @@ struct ImportedScene {
   std::vector<ImportedMesh> meshes;
   std::vector<ImportedInstance> instances;
   std::vector<skeleton::Clip> clips;  ///< `Channel::joint` is a node; start, end and num_keys are not used.
+  std::vector<FaultyClip> faulty_clips;  ///< of the file's clips those that are not among `clips`.
   std::vector<Finding> findings;
 };
 
 /// Checks every index, count and number of a scene as if an enemy had written it. Throws InputError (with
-/// `file`) naming the mesh and vertex, joint, node or clip and key at fault: NaN or infinite numbers, indices
-/// out of range, negative weights, singular bind matrices, key times that do not increase, zero quaternions.
-void check_scene(const std::string& file, const ImportedScene& scene);
+/// `file`) naming the mesh and vertex, joint, node or clip and key at fault: NaN or infinite numbers (weights
+/// apart), indices out of range, negative weights, singular bind matrices, key times that do not increase,
+/// zero quaternions. Clips that fail are moved to `faulty_clips`; only where no other is left, the first of
+/// them is thrown.
+void check_scene(const std::string& file, ImportedScene& scene);
 
 /// Name of a node for messages: its own, or "node 12" where it has none.
 std::string name_of(const ImportedScene& scene, int node);

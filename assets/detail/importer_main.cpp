@@ -61,18 +61,12 @@ std::string answer_with(AnswerKind kind, const std::string& payload) {
   return std::string(1, static_cast<char>(kind)) + payload;
 }
 
-/// InputError puts the file before its message; the parent does that again.
-std::string without_file(const std::string& file, const std::string& message) {
-  const std::string prefix = file + ": ";
-  return message.rfind(prefix, 0) == 0 ? message.substr(prefix.size()) : message;
-}
-
 std::string import(const std::string& file) {
   try {
     return answer_with(AnswerKind::Scene,
                        write_scene(is_gltf(file) ? read_gltf(file) : read_with_assimp(file)));
   } catch (const InputError& e) {
-    return answer_with(AnswerKind::Input, without_file(file, e.what()));
+    return answer_with(AnswerKind::Input, without_file(file, e.what()));  // the parent puts it back
   } catch (const IoError& e) {
     return answer_with(AnswerKind::Io, e.what());
   } catch (const LimitError& e) {

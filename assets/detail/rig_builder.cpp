@@ -62,7 +62,7 @@ class RigBuilder {
     make_parts();
     find_units();
     make_skeleton();
-    for (std::size_t c = 0; c < scene_.clips.size(); ++c) make_clip(c);
+    make_clips();
     rig_.findings.insert(rig_.findings.begin(), scene_.findings.begin(), scene_.findings.end());
     bind_coincident_copies(rig_);
     report_skin(rig_);
@@ -277,9 +277,31 @@ class RigBuilder {
 
   // ---- clips
 
-  void make_clip(std::size_t c) {
+  /// Names are taken in the file's order, so that a faulty clip changes nobody else's.
+  void make_clips() {
+    std::map<int, const FaultyClip*> faulty;
+    for (const FaultyClip& clip : scene_.faulty_clips) faulty[clip.index] = &clip;
+    int index = 0;
+    const auto name_faulty = [&] {
+      for (auto at_index = faulty.find(index); at_index != faulty.end(); at_index = faulty.find(++index)) {
+        FaultyClip clip = *at_index->second;
+        clip.name = clip_names_.take(clip.name, "clip_" + std::to_string(index));
+        const std::size_t hint = clip.reason.find("; hint: ");
+        find(Finding::Severity::Warning, "clip-faulty", clip.name, clip.reason.substr(0, hint),
+             hint == std::string::npos ? "export the clip again" : clip.reason.substr(hint + 8));
+        rig_.faulty_clips.push_back(std::move(clip));
+      }
+    };
+    for (std::size_t c = 0; c < scene_.clips.size(); ++c, ++index) {
+      name_faulty();
+      make_clip(c, "clip_" + std::to_string(index));
+    }
+    name_faulty();
+  }
+
+  void make_clip(std::size_t c, const std::string& otherwise) {
     skeleton::Clip clip;
-    clip.name = clip_names_.take(scene_.clips[c].name, "clip_" + std::to_string(c));
+    clip.name = clip_names_.take(scene_.clips[c].name, otherwise);
     std::set<double> keys;
     std::size_t num_dropped = 0;
     for (skeleton::Channel& source : scene_.clips[c].channels) {

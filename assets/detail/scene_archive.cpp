@@ -215,6 +215,13 @@ void exchange(A& a, Finding& v) {
 }
 
 template <typename A>
+void exchange(A& a, FaultyClip& v) {
+  exchange(a, v.name);
+  exchange(a, v.reason);
+  exchange(a, v.index);
+}
+
+template <typename A>
 void exchange(A& a, ImportedScene& v) {
   exchange(a, v.format);
   exchange(a, v.metres_per_unit);
@@ -226,6 +233,7 @@ void exchange(A& a, ImportedScene& v) {
   exchange(a, v.meshes);
   exchange(a, v.instances);
   exchange(a, v.clips);
+  exchange(a, v.faulty_clips);
   exchange(a, v.findings);
 }
 

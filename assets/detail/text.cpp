@@ -51,4 +51,9 @@ std::string printable(std::string_view text) {
 
 std::string number(double value) { return fmt::format("{:.6g}", value); }
 
+std::string without_file(const std::string& file, const std::string& what) {
+  const std::string prefix = file + ": ";
+  return what.rfind(prefix, 0) == 0 ? what.substr(prefix.size()) : what;
+}
+
 }  // namespace sinew::assets::detail

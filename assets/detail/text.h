@@ -12,4 +12,7 @@ std::string printable(std::string_view text);
 /// A number for a message: short, and "nan" or "inf" where it is not finite.
 std::string number(double value);
 
+/// The message of an InputError on `file` without the file that opens it.
+std::string without_file(const std::string& file, const std::string& what);
+
 }  // namespace sinew::assets::detail

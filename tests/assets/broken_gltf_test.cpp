@@ -193,14 +193,23 @@ INSTANTIATE_TEST_SUITE_P(
                "hint: bake "
                "the animation and export again"},
         Broken{"fewer values than keys", [](TinyGltf& g) { g.document["accessors"][6]["count"] = 1; },
-               "/animations/0/samplers/0/output: number of values, got 1, expected 2 for 2 keys"},
+               "clip 'nod': /animations/0/samplers/0/output: number of values, got 1, expected 2 for 2 keys"},
         Broken{"unknown interpolation",
                [](TinyGltf& g) { g.document["animations"][0]["samplers"][0]["interpolation"] = "MAGIC"; },
-               "/animations/0/samplers/0/interpolation: got 'MAGIC', expected LINEAR, STEP or CUBICSPLINE"},
+               "clip 'nod': /animations/0/samplers/0/interpolation: got 'MAGIC', expected LINEAR, STEP or "
+               "CUBICSPLINE"},
         Broken{"channel for a missing node",
                [](TinyGltf& g) { g.document["animations"][0]["channels"][0]["target"]["node"] = 8; },
-               "/animations/0/channels/0/target/node: index, got 8, expected 0 to 2; hint: export the file "
+               "clip 'nod': /animations/0/channels/0/target/node: index, got 8, expected 0 to 2; hint: "
+               "export the file "
                "again"},
+        Broken{"one part of a node animated twice",
+               [](TinyGltf& g) {
+                 json& channels = g.document["animations"][0]["channels"];
+                 channels.push_back(channels[0]);
+               },
+               "clip 'nod': /animations/0/channels/1/target: node's rotation is animated twice in one clip, "
+               "expected once"},
         Broken{"sparse count",
                [](TinyGltf& g) {
                  g.document["accessors"][0]["sparse"] = {
@@ -264,7 +273,8 @@ TEST(GltfUris, OutsideTheAssetsDirectoryAreRefusedInEveryDisguise) {
 std::string error_of(const std::string& bytes) {
   const std::string file = write_file("bytes.glb", bytes);
   try {
-    detail::check_scene(file, detail::read_gltf(file));
+    detail::ImportedScene scene = detail::read_gltf(file);
+    detail::check_scene(file, scene);
   } catch (const InputError& e) {
     return std::string(e.what()).substr(file.size() + 2);
   }

@@ -172,6 +172,70 @@ TEST(GltfReader, LeavesOutMorphTargetsPointsAndLinesWithAWord) {
   EXPECT_TRUE(has_finding(rig, "lines-ignored"));
 }
 
+std::string message_of(const Rig& rig, const std::string& code) {
+  for (const Finding& finding : rig.findings)
+    if (finding.code == code) return finding.where + ": " + finding.message;
+  return "";
+}
+
+TEST(GltfReader, NamesChannelsThatBelongToAnExtensionAndPlaysTheOthers) {
+  TinyGltf gltf;
+  json& animations = gltf.document["animations"];
+  animations.push_back(
+      {{"name", "glow"},
+       {"channels",
+        {{{"sampler", 0},
+          {"target",
+           {{"path", "pointer"},
+            {"extensions", {{"KHR_animation_pointer", {{"pointer", "/materials/0/emissiveFactor"}}}}}}}}}},
+       {"samplers", {{{"input", 5}, {"output", 6}}}}});
+  animations[1]["channels"].push_back(animations[0]["channels"][0]);
+  const Rig rig = rig_of(gltf);
+  EXPECT_EQ(
+      message_of(rig, "channels-ignored"),
+      "glow: channel 0 (KHR_animation_pointer '/materials/0/emissiveFactor'): no node is animated there; "
+      "left out");
+  ASSERT_EQ(rig.clips.size(), 2u);
+  EXPECT_EQ(rig.clips[1].channels.size(), 1u);
+}
+
+TEST(GltfReader, SetsOneFaultyClipOfSeveralAside) {
+  TinyGltf gltf;
+  json& animations = gltf.document["animations"];
+  animations.insert(animations.begin(), animations[0]);
+  animations[0].erase("name");
+  animations[0]["channels"].push_back(animations[0]["channels"][0]);  // twice
+  animations.push_back(animations[1]);
+  animations[2]["name"] = "jerk";
+  const int times = gltf.add<float>("SCALAR", 5126, {0, 0}, 1);
+  animations[2]["samplers"][0]["input"] = times;
+  animations.push_back(animations[1]);
+  animations[3].erase("name");
+  const Rig rig = rig_of(gltf);
+  ASSERT_EQ(rig.clips.size(), 2u);
+  EXPECT_EQ(rig.clips[0].name, "nod");
+  EXPECT_EQ(rig.clips[1].name, "clip_3");  // its place in the file
+  ASSERT_EQ(rig.faulty_clips.size(), 2u);
+  EXPECT_EQ(rig.faulty_clips[0].name, "clip_0");
+  EXPECT_EQ(rig.faulty_clips[1].name, "jerk");
+  EXPECT_TRUE(has_finding(rig, "clip-faulty"));
+  EXPECT_EQ(choose_clip(rig, ""), 0);
+  try {
+    choose_clip(rig, "jerk");
+    FAIL() << "taken";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(),
+                HasSubstr("tiny.glb: clip 'jerk': node 'head': rotation: key 1: times do not increase"));
+  }
+  try {
+    choose_clip(rig, "clip_0");
+    FAIL() << "taken";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(),
+                HasSubstr("clip 0: /animations/0/channels/1/target: node's rotation is animated twice"));
+  }
+}
+
 TEST(GltfReader, TakesTheIdentityWhereASkinStatesNoBindMatrices) {
   TinyGltf gltf;
   gltf.document["skins"].push_back({{"joints", {0}}});  // one that no mesh uses

@@ -251,6 +251,19 @@ TEST(ChooseClip, TakesTheFirstThatMovesUnlessOneIsNamed) {
   EXPECT_EQ(choose_clip(rig, "pose"), 0);
 }
 
+TEST(ChooseClip, SaysWhatIsWrongWithAFaultyOneWhenItIsAskedFor) {
+  Rig rig = small_rig();
+  rig.clips = {clip("walk", 2, 1.0)};
+  rig.faulty_clips = {{"run", "clip 'run': torn; hint: mend it", 0}};
+  EXPECT_EQ(choose_clip(rig, ""), 0);
+  try {
+    choose_clip(rig, "run");
+    FAIL() << "took a faulty clip";
+  } catch (const InputError& e) {
+    EXPECT_STREQ(e.what(), "small.glb: clip 'run': torn; hint: mend it");
+  }
+}
+
 TEST(ChooseClip, NamesTheClipsThereAre) {
   Rig rig = small_rig();
   rig.clips = {clip("pose", 1, 0.0), clip("walk", 2, 1.0)};
