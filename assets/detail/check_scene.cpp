@@ -126,7 +126,8 @@ class Checker {
           refuse(thing + ": joint index, got " + std::to_string(influence.frame) + ", expected 0 to " +
                  std::to_string(num_joints - 1) + "; hint: bind the skin again");
         }
-        if (!std::isfinite(influence.weight) || influence.weight < 0.0) {
+        // What is no number counts as no weight: normalise_weights().
+        if (std::isfinite(influence.weight) && influence.weight < 0.0) {
           const auto& joints = scene_.skins[static_cast<std::size_t>(instance.skin)].joints;
           refuse(thing + ": weight of joint '" +
                  printable(name_of(scene_, joints[static_cast<std::size_t>(influence.frame)])) + "', got " +

@@ -39,7 +39,8 @@ struct ImportedMesh {
   std::string name;
   lattice::Points points;        ///< num_vertices x 3, in the mesh's own space.
   lattice::Triangles triangles;  ///< num_triangles x 3.
-  /// Per vertex, `frame` counts within the joints of the skin; not necessarily normalised. Empty: unskinned.
+  /// Per vertex, `frame` counts within the joints of the skin; not necessarily normalised, nor even numbers.
+  /// Empty: unskinned.
   std::vector<std::vector<lattice::Influence>> weights;
 };
 

@@ -27,6 +27,7 @@ struct Statistics {
   std::size_t worst_vertex = 0;
   double worst_sum = 1.0;
   std::size_t num_missing = 0;
+  std::size_t num_not_numbers = 0;  ///< vertices.
   std::size_t max_influences = 0;
 };
 
@@ -48,6 +49,8 @@ Statistics divide_by_sums(ImportedMesh& mesh) {
   Statistics statistics;
   for (std::size_t v = 0; v < mesh.weights.size(); ++v) {
     std::vector<Influence>& influences = mesh.weights[v];
+    if (std::erase_if(influences, [](const Influence& i) { return !std::isfinite(i.weight); }) > 0)
+      ++statistics.num_not_numbers;
     merge_joints(influences);
     double sum = 0.0;
     for (const Influence& influence : influences) sum += influence.weight;
@@ -123,6 +126,12 @@ void report(const ImportedMesh& mesh, const Statistics& statistics, std::vector<
              " vertices had weights that did not sum to 1 (worst: " + number(statistics.worst_sum) +
              " at vertex " + std::to_string(statistics.worst_vertex) + "); they were normalised",
          "normalise the weights in the modelling program"});
+  }
+  if (statistics.num_not_numbers > 0) {
+    findings.push_back({Finding::Severity::Warning, "weights-not-numbers", mesh.name,
+                        std::to_string(statistics.num_not_numbers) + " of " + num_vertices +
+                            " vertices had weights that are no numbers (nan or inf); those count as 0",
+                        "weight these vertices again"});
   }
   if (statistics.num_missing > 0) {
     findings.push_back({Finding::Severity::Warning, "weights-missing", mesh.name,

@@ -255,6 +255,23 @@ TEST(GltfReader, TakesPlainDataThatStandsBesideCompressedData) {
   EXPECT_EQ(rig_of(gltf).parts[0].points, rig_of(TinyGltf()).parts[0].points);
 }
 
+TEST(GltfReader, RepairsWeightsThatAreNoNumbersLikeMissingOnes) {
+  TinyGltf gltf;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t i = 0; i < 4; ++i) gltf.set<float>(TinyGltf::kWeights, i, nan);  // all of vertex 0
+  gltf.set<float>(TinyGltf::kWeights, 13, std::numeric_limits<float>::infinity());  // one of vertex 3
+  const Rig rig = rig_of(gltf);
+  EXPECT_EQ(message_of(rig, "weights-not-numbers"),
+            "skin: 2 of 4 vertices had weights that are no numbers (nan or inf); those count as 0");
+  EXPECT_TRUE(has_finding(rig, "weights-missing"));
+  // Vertex 0 follows its neighbour 1, which hangs on the hip; vertex 3 keeps its other weight.
+  for (const std::size_t v : {0u, 3u}) {
+    ASSERT_EQ(rig.parts[0].weights[v].size(), 1u);
+    EXPECT_EQ(rig.parts[0].weights[v][0].frame, 0);
+    EXPECT_EQ(rig.parts[0].weights[v][0].weight, 1.0);
+  }
+}
+
 TEST(GltfReader, LeavesOutMeshesOfOtherScenes) {
   TinyGltf gltf;
   gltf.document["nodes"].push_back({{"name", "elsewhere"}, {"mesh", 0}});
