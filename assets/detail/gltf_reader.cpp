@@ -286,26 +286,59 @@ class GltfReader {
 
   // ---- scene
 
-  void place_instances() {
-    std::vector<bool> shown(model_.nodes.size(), model_.scenes.empty());
-    if (!model_.scenes.empty()) {
-      const int which = model_.defaultScene < 0 ? 0 : model_.defaultScene;
-      check_index("/scene", which, model_.scenes);
-      const std::string path = "/scenes/" + std::to_string(which) + "/nodes";
-      for (const int root : model_.scenes[static_cast<std::size_t>(which)].nodes) {
-        check_index(path, root, model_.nodes);
-        shown[static_cast<std::size_t>(root)] = true;
-      }
-      for (const std::size_t n : order_) {
-        if (parent_[n] >= 0 && shown[static_cast<std::size_t>(parent_[n])]) shown[n] = true;
-      }
+  /// Per node whether a scene of the file shows it.
+  std::vector<bool> shown_in(int scene) const {
+    std::vector<bool> shown(model_.nodes.size(), false);
+    const std::string path = "/scenes/" + std::to_string(scene) + "/nodes";
+    for (const int root : model_.scenes[static_cast<std::size_t>(scene)].nodes) {
+      check_index(path, root, model_.nodes);
+      shown[static_cast<std::size_t>(root)] = true;
     }
     for (const std::size_t n : order_) {
+      if (parent_[n] >= 0 && shown[static_cast<std::size_t>(parent_[n])]) shown[n] = true;
+    }
+    return shown;
+  }
+
+  bool has_character(const std::vector<bool>& shown) const {
+    for (std::size_t n = 0; n < shown.size(); ++n) {
+      if (shown[n] && model_.nodes[n].mesh >= 0 && model_.nodes[n].skin >= 0) return true;
+    }
+    return false;
+  }
+
+  /// The file's default scene, or the first other one where only that shows a skinned mesh.
+  std::vector<bool> shown_nodes() {
+    if (model_.scenes.empty()) return std::vector<bool>(model_.nodes.size(), true);
+    const int wanted = model_.defaultScene < 0 ? 0 : model_.defaultScene;
+    check_index("/scene", wanted, model_.scenes);
+    std::vector<bool> shown = shown_in(wanted);
+    if (has_character(shown)) return shown;
+    for (int scene = 0; scene < static_cast<int>(model_.scenes.size()); ++scene) {
+      std::vector<bool> other = shown_in(scene);
+      if (!has_character(other)) continue;
+      const std::string& name = model_.scenes[static_cast<std::size_t>(scene)].name;
+      scene_.findings.push_back({Finding::Severity::Warning, "other-scene-taken", printable(name),
+                                 "the default scene " + std::to_string(wanted) +
+                                     " shows no skinned mesh; scene " + std::to_string(scene) +
+                                     " does and is taken",
+                                 "make it the default scene"});
+      return other;
+    }
+    return shown;
+  }
+
+  void place_instances() {
+    for (std::size_t n = 0; n < model_.nodes.size(); ++n) {
       const tinygltf::Node& node = model_.nodes[n];
       if (node.mesh < 0) continue;
       check_index(node_label(n) + "/mesh", node.mesh, model_.meshes);
       if (node.skin >= 0) check_index(node_label(n) + "/skin", node.skin, model_.skins);
-      if (!shown[n]) continue;
+    }
+    const std::vector<bool> shown = shown_nodes();
+    for (const std::size_t n : order_) {
+      const tinygltf::Node& node = model_.nodes[n];
+      if (node.mesh < 0 || !shown[n]) continue;
       const auto meshes = meshes_of_.find(static_cast<std::size_t>(node.mesh));
       if (meshes == meshes_of_.end()) continue;
       for (const int mesh : meshes->second) {

@@ -178,6 +178,18 @@ std::string message_of(const Rig& rig, const std::string& code) {
   return "";
 }
 
+TEST(GltfReader, TakesTheIdentityWhereASkinStatesNoBindMatrices) {
+  TinyGltf gltf;
+  gltf.document["skins"].push_back({{"joints", {0}}});  // one that no mesh uses
+  EXPECT_EQ(rig_of(gltf).parts[0].points, rig_of(TinyGltf()).parts[0].points);
+  gltf.document["skins"][0].erase("inverseBindMatrices");
+  gltf.document["nodes"][1].erase("translation");  // where the identity has it
+  const Rig rig = rig_of(gltf);
+  EXPECT_EQ(rig.parts[0].points, rig_of(TinyGltf()).parts[0].points);
+  for (const skeleton::Joint& joint : rig.skeleton.joints())
+    EXPECT_TRUE(joint.rest_from_joint.isApprox(Eigen::Affine3d::Identity(), kEps)) << joint.name;
+}
+
 TEST(GltfReader, NamesChannelsThatBelongToAnExtensionAndPlaysTheOthers) {
   TinyGltf gltf;
   json& animations = gltf.document["animations"];
@@ -236,18 +248,6 @@ TEST(GltfReader, SetsOneFaultyClipOfSeveralAside) {
   }
 }
 
-TEST(GltfReader, TakesTheIdentityWhereASkinStatesNoBindMatrices) {
-  TinyGltf gltf;
-  gltf.document["skins"].push_back({{"joints", {0}}});  // one that no mesh uses
-  EXPECT_EQ(rig_of(gltf).parts[0].points, rig_of(TinyGltf()).parts[0].points);
-  gltf.document["skins"][0].erase("inverseBindMatrices");
-  gltf.document["nodes"][1].erase("translation");  // where the identity has it
-  const Rig rig = rig_of(gltf);
-  EXPECT_EQ(rig.parts[0].points, rig_of(TinyGltf()).parts[0].points);
-  for (const skeleton::Joint& joint : rig.skeleton.joints())
-    EXPECT_TRUE(joint.rest_from_joint.isApprox(Eigen::Affine3d::Identity(), kEps)) << joint.name;
-}
-
 TEST(GltfReader, TakesPlainDataThatStandsBesideCompressedData) {
   TinyGltf gltf;
   gltf.primitive()["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
@@ -270,6 +270,20 @@ TEST(GltfReader, RepairsWeightsThatAreNoNumbersLikeMissingOnes) {
     EXPECT_EQ(rig.parts[0].weights[v][0].frame, 0);
     EXPECT_EQ(rig.parts[0].weights[v][0].weight, 1.0);
   }
+}
+
+TEST(GltfReader, FindsTheCharacterInAnotherScene) {
+  TinyGltf gltf;
+  gltf.document["nodes"].push_back({{"name", "prop"}, {"mesh", 0}});
+  gltf.document["scenes"] = {
+      {{"nodes", {3}}}, {{"nodes", json::array()}}, {{"name", "stage"}, {"nodes", {0, 2}}}};
+  const Rig rig = rig_of(gltf);
+  ASSERT_EQ(rig.parts.size(), 1u);
+  EXPECT_EQ(rig.parts[0].role, PartRole::Simulated);
+  EXPECT_EQ(message_of(rig, "other-scene-taken"),
+            "stage: the default scene 0 shows no skinned mesh; scene 2 does and is taken");
+  gltf.document["scene"] = 2;
+  EXPECT_FALSE(has_finding(rig_of(gltf), "other-scene-taken"));
 }
 
 TEST(GltfReader, LeavesOutMeshesOfOtherScenes) {
