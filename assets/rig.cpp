@@ -192,9 +192,12 @@ int choose_clip(const Rig& rig, const std::string& name) {
   for (std::size_t i = 0; i < rig.clips.size(); ++i) {
     if (rig.clips[i].num_keys >= 2 && rig.clips[i].duration() > 0.0) return static_cast<int>(i);
   }
+  for (std::size_t i = 0; i < rig.clips.size(); ++i) {
+    if (rig.clips[i].num_keys >= 1) return static_cast<int>(i);
+  }
   throw InputError(rig.file, "clips: no motion, got " + list_of_clips(rig) +
-                                 ", expected a clip with at least two different key times; hint: export the "
-                                 "character together with an animation");
+                                 ", expected a clip with keys; hint: export the character together with an "
+                                 "animation");
 }
 
 }  // namespace sinew::assets

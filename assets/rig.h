@@ -57,8 +57,8 @@ struct Rig {
   skeleton::Skeleton skeleton;
   std::vector<skeleton::Clip> clips;
   std::vector<FaultyClip> faulty_clips;  ///< left out of `clips`.
-  double metres_per_unit = 1.0;  ///< file units were multiplied by this.
-  UpAxis up_axis = UpAxis::Y;    ///< of the file.
+  double metres_per_unit = 1.0;          ///< file units were multiplied by this.
+  UpAxis up_axis = UpAxis::Y;            ///< of the file.
   /// rig_from_file: file world coordinates (units, axes) to the rig's; a similarity. Outputs in file space
   /// use its inverse.
   Eigen::Affine3d rig_from_file = Eigen::Affine3d::Identity();
@@ -102,9 +102,9 @@ struct LoadOptions {
 /// Throws InputError, IoError or LimitError with one line that names the file, the thing and the remedy.
 Rig load_rig(const std::string& file, const LoadOptions& options = {});
 
-/// Index of the clip taken when none is named: the first with at least two distinct keys and a duration > 0.
-/// Throws ConfigError when `name` is given and absent (listing the clips), InputError when it
-/// is faulty or no clip is usable.
+/// Index of the clip taken when none is named: the first with at least two distinct keys and a duration > 0,
+/// else the first with a key, which is a pose. Throws ConfigError when `name` is given and absent (listing
+/// the clips), InputError when it is faulty or no clip is usable.
 int choose_clip(const Rig& rig, const std::string& name);
 
 }  // namespace sinew::assets

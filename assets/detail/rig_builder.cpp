@@ -407,9 +407,15 @@ class RigBuilder {
     for (const skeleton::Clip& clip : rig_.clips) {
       if (clip.num_keys >= 2 && clip.duration() > 0.0) moving.push_back("'" + clip.name + "'");
     }
-    if (moving.empty()) {
+    const auto pose = std::find_if(rig_.clips.begin(), rig_.clips.end(),
+                                   [](const skeleton::Clip& clip) { return clip.num_keys >= 1; });
+    if (moving.empty() && pose != rig_.clips.end()) {
+      find(Finding::Severity::Warning, "clip-is-a-pose", pose->name,
+           "no clip moves; this one holds a pose, in which the flesh settles",
+           "export the character together with an animation if it should move");
+    } else if (moving.empty()) {
       find(Finding::Severity::Error, "no-clip", "",
-           rig_.clips.empty() ? "the file holds no animation" : "no clip has two different key times",
+           rig_.clips.empty() ? "the file holds no animation" : "no clip keys a joint",
            "export the character together with an animation");
     } else if (moving.size() > 1) {
       find(Finding::Severity::Info, "several-clips", "",

@@ -249,6 +249,9 @@ TEST(ChooseClip, TakesTheFirstThatMovesUnlessOneIsNamed) {
   EXPECT_EQ(choose_clip(rig, ""), 2);
   EXPECT_EQ(choose_clip(rig, "run"), 3);
   EXPECT_EQ(choose_clip(rig, "pose"), 0);
+  // Where nothing moves, the first with a key is a pose.
+  rig.clips = {clip("empty", 0, 0.0), clip("pose", 1, 0.0), clip("other", 1, 0.0)};
+  EXPECT_EQ(choose_clip(rig, ""), 1);
 }
 
 TEST(ChooseClip, SaysWhatIsWrongWithAFaultyOneWhenItIsAskedFor) {
@@ -276,12 +279,12 @@ TEST(ChooseClip, NamesTheClipsThereAre) {
         "small.glb: clip 'wlak': not in the file, which has 'pose', 'walk'; hint: name one of these, or "
         "none for the first that moves");
   }
-  rig.clips.pop_back();
+  rig.clips = {clip("empty", 0, 0.0)};
   try {
     choose_clip(rig, "");
     FAIL() << "took a clip without motion";
   } catch (const InputError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("small.glb: clips: no motion, got 'pose'"));
+    EXPECT_THAT(e.what(), HasSubstr("small.glb: clips: no motion, got 'empty'"));
   }
 }
 
