@@ -146,11 +146,16 @@ PhysicsSkin physics_skin(const Rig& rig) {
               : -1);
     }
     if (part.role != PartRole::Simulated) continue;
+    auto next_turned = part.turned.begin();
     for (Eigen::Index t = 0; t < part.triangles.rows(); ++t) {
       std::array<int, 3> corners{};
       for (int c = 0; c < 3; ++c) {
         corners[static_cast<std::size_t>(c)] =
             result.surface_of_vertex[first + static_cast<std::size_t>(part.triangles(t, c))];
+      }
+      if (next_turned != part.turned.end() && *next_turned == t) {
+        std::swap(corners[1], corners[2]);
+        ++next_turned;
       }
       if (corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0]) {
         triangles.push_back(corners);

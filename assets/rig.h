@@ -38,6 +38,8 @@ struct Part {
   /// Skinned parts: influences per vertex, frame = joint index; each sums to 1. Rigid parts: empty.
   std::vector<std::vector<lattice::Influence>> weights;
   int joint = -1;  ///< Rigid: the joint it follows.
+  /// Simulated: triangles that physics takes the other way round, as their closed shell shows; ascending.
+  std::vector<int> turned;
 };
 
 /// A clip of the file that cannot be played.

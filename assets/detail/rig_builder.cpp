@@ -12,6 +12,7 @@
 #include "assets/detail/skin_report.h"
 #include "assets/detail/skin_weights.h"
 #include "assets/detail/text.h"
+#include "assets/detail/turned_shells.h"
 #include "assets/detail/units.h"
 #include "assets/error.h"
 
@@ -65,6 +66,7 @@ class RigBuilder {
     make_clips();
     rig_.findings.insert(rig_.findings.begin(), scene_.findings.begin(), scene_.findings.end());
     bind_coincident_copies(rig_);
+    turn_shells(rig_);
     report_skin(rig_);
     judge();
     return std::move(rig_);
