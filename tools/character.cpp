@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "assets/collapse.h"
 #include "assets/error.h"
 #include "assets/lattice_cache.h"
 #include "assets/lattice_files.h"
@@ -63,9 +64,16 @@ std::vector<std::vector<Eigen::Affine3d>> sample_poses(const Character& c) {
     return poses;
   }
   const double duration = std::min(c.the_clip().duration(), 3600.0);  // an hour shows what a clip does
-  for (int k = 0; k * kPoseSpacing < duration; ++k)
-    poses.push_back(c.pose(c.the_clip().start + k * kPoseSpacing));
-  poses.push_back(c.pose(c.the_clip().end));
+  // What is scaled to nothing tells nothing about how the flesh bends; the frames before and after it do.
+  const double start = c.the_clip().start;
+  const bool whole = !assets::first_collapse(c.rig, c.the_clip(), start, c.the_clip().end);
+  const auto add = [&](double time) {
+    if (whole || !assets::first_collapse(c.rig, c.the_clip(), time, time)) poses.push_back(c.pose(time));
+  };
+  for (int k = 0; k * kPoseSpacing < duration; ++k) add(start + k * kPoseSpacing);
+  add(c.the_clip().end);
+  if (poses.empty())
+    poses.emplace_back(static_cast<std::size_t>(c.rig.skeleton.num_joints()), Eigen::Affine3d::Identity());
   return poses;
 }
 
@@ -409,16 +417,40 @@ fem::SimulationOptions simulation_options(const Scene& scene) {
   return options;
 }
 
-FrameRange frame_range(const Scene& scene, const skeleton::Clip& clip) {
-  if (scene.frames) return *scene.frames;
-  constexpr double kMostFrames = 1e6;
-  const double frames = std::floor(clip.duration() * scene.fps + 1e-6);  // rounding of keys stored as floats
-  if (frames > kMostFrames) {
-    throw assets::LimitError(
-        fmt::format("clip '{}' has {} frames at {} fps, limit {}; hint: --frames A-B or a lower --fps",
-                    clip.name, frames, scene.fps, kMostFrames));
+FrameRange frame_range(const Scene& scene, const Character& character, const Talk& talk) {
+  const skeleton::Clip& clip = character.the_clip();
+  FrameRange range{0, 0};
+  if (scene.frames) {
+    range = *scene.frames;
+  } else {
+    constexpr double kMostFrames = 1e6;
+    const double frames =
+        std::floor(clip.duration() * scene.fps + 1e-6);  // rounding of keys stored as floats
+    if (frames > kMostFrames) {
+      throw assets::LimitError(
+          fmt::format("clip '{}' has {} frames at {} fps, limit {}; hint: --frames A-B or a lower --fps",
+                      clip.name, frames, scene.fps, kMostFrames));
+    }
+    range.last = static_cast<int>(frames);
   }
-  return {0, static_cast<int>(frames)};
+  const auto time_of = [&](int frame) { return clip.start + frame / scene.fps; };
+  const auto collapse =
+      assets::first_collapse(character.rig, clip, time_of(range.first), time_of(range.last));
+  if (!collapse) return range;
+  const std::string what =
+      fmt::format("clip '{}': {}", clip.name, assets::collapse_text(character.rig, *collapse));
+  // The last frame that lies before it.
+  const int last = static_cast<int>(std::ceil((collapse->time - clip.start) * scene.fps - 1e-6)) - 1;
+  if (scene.frames || last < range.first) {
+    throw assets::InputError(
+        character.rig.file,
+        fmt::format("{}, expected flesh with a volume in frames {} to {}; hint: {}", what, range.first,
+                    range.last,
+                    last < range.first ? std::string("--frames after that")
+                                       : fmt::format("--frames {}-{}", range.first, last)));
+  }
+  talk(fmt::format("warning: {}; frames {} to {} before it are made", what, range.first, last));
+  return {range.first, last};
 }
 
 }  // namespace sinew::tools

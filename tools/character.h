@@ -67,7 +67,9 @@ fem::Body paint_body(const Character& character);
 /// fem's options for a scene.
 fem::SimulationOptions simulation_options(const Scene& scene);
 
-/// Clip times of the output frames: t0 + k / fps for the scene's frames, or for the whole clip.
-FrameRange frame_range(const Scene& scene, const skeleton::Clip& clip);
+/// Output frames, at the clip times t0 + k / fps: the scene's, or the whole clip. Where the clip scales flesh
+/// to nothing the whole clip ends before that, with a word; frames that the scene asks for and that reach it
+/// are an assets::InputError.
+FrameRange frame_range(const Scene& scene, const Character& character, const Talk& talk);
 
 }  // namespace sinew::tools

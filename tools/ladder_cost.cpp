@@ -65,7 +65,7 @@ struct Times {
 };
 
 Times times_of(const Scene& scene, const Character& character) {
-  const FrameRange range = frame_range(scene, character.the_clip());
+  const FrameRange range = frame_range(scene, character, [](const std::string&) {});
   Times times;
   times.first = character.the_clip().start + range.first / scene.fps;
   times.span = (range.last - range.first) / scene.fps;

@@ -343,7 +343,7 @@ void simulate(const Scene& scene, const Talk& talk) {
       scene.overwrite ? assets::Overwrite::Replace : assets::Overwrite::Refuse;
   assets::OutputDirectory out(scene.output, overwrite, kOutputs);
   const Character character = make_character(scene, talk);
-  const FrameRange frames = frame_range(scene, character.the_clip());
+  const FrameRange frames = frame_range(scene, character, talk);
   const OutputLayout layout = make_layout(scene, character);
   say_what_runs(scene, character, frames, talk);
   stop_if_interrupted("before the simulation");

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "assets/collapse.h"
 #include "assets/detail/part_copies.h"
 #include "assets/detail/rest_pose.h"
 #include "assets/detail/skin_report.h"
@@ -67,6 +68,7 @@ class RigBuilder {
     rig_.findings.insert(rig_.findings.begin(), scene_.findings.begin(), scene_.findings.end());
     bind_coincident_copies(rig_);
     turn_shells(rig_);
+    report_collapses();
     report_skin(rig_);
     judge();
     return std::move(rig_);
@@ -392,6 +394,16 @@ class RigBuilder {
     find(Finding::Severity::Warning, "step-keys", clip.name,
          "joints jump between keys by up to " + number(metres) + " m and " + number(degrees) + " degrees",
          "export with linear or spline interpolation");
+  }
+
+  void report_collapses() {
+    for (const skeleton::Clip& clip : rig_.clips) {
+      const auto collapse = first_collapse(rig_, clip, clip.start, clip.end);
+      if (!collapse) continue;
+      find(Finding::Severity::Info, "flesh-scaled-to-nothing", clip.name,
+           collapse_text(rig_, *collapse) + "; only frames before that can be simulated",
+           "hide it by other means than its scale, or state the frames");
+    }
   }
 
   // ---- verdict

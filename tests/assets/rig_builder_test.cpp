@@ -222,6 +222,24 @@ TEST(BuildRig, ExportsBackWhereClipsMoveTheRoot) {
   EXPECT_LT((got - expected).rowwise().norm().maxCoeff(), 1e-10);
 }
 
+TEST(BuildRig, SaysWhichClipScalesFleshToNothing) {
+  Random random(20032);
+  ImportedScene scene = worm(4, Eigen::Affine3d::Identity(), random);
+  for (const double end : {0.5, 0.0}) {
+    skeleton::Channel channel;
+    channel.joint = 3;
+    channel.scale = {skeleton::Interpolation::Linear, {2, 4}, {{1, 1, 1}, {1, end, 1}}, {}, {}};
+    scene.clips.push_back({end > 0.0 ? "shrink" : "vanish", 0, 0, 0, {channel}});
+  }
+  const Rig rig = build_rig("worm", scene, {});
+  std::vector<std::string> said;
+  for (const Finding& finding : rig.findings)
+    if (finding.code == "flesh-scaled-to-nothing") said.push_back(finding.where + ": " + finding.message);
+  EXPECT_THAT(said,
+              testing::ElementsAre("vanish: joint 'joint2' is scaled to nothing at 4 s; only frames before "
+                                   "that can be simulated"));
+}
+
 TEST(BuildRig, RefusesSkinsThatWereBoundInDifferentPoses) {
   Random random(20026);
   ImportedScene scene = worm(4, Eigen::Affine3d::Identity(), random);
