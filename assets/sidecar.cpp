@@ -64,6 +64,7 @@ std::string sidecar_json(const Sidecar& sidecar) {
                {"generator", "sinew " + sidecar.version},
                {"rig", sidecar.rig_file},
                {"clip", sidecar.clip},
+               {"clip_start_s", sidecar.clip_start},
                {"rest_mesh", sidecar.rest_mesh},
                {"cache", sidecar.cache},
                {"vertex_count", sidecar.rest.rows()},

@@ -36,7 +36,8 @@ struct Sidecar {
   FloatPoints rest;                ///< rest positions in the order and units of the cache.
   std::vector<SidecarPart> parts;  ///< in order; their vertices add up to rest's.
   VertexOrder vertex_order = VertexOrder::File;
-  double fps = 0.0;  ///< frames per second.
+  double fps = 0.0;         ///< frames per second.
+  double clip_start = 0.0;  ///< time of frame 0 in the clip [s]; clips may start late.
   int first_frame = 0;
   int num_frames = 0;
   double metres_per_unit = 1.0;  ///< of the cache's coordinates.

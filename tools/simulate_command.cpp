@@ -207,6 +207,7 @@ void write_companions(const Scene& scene, const Character& character, const Outp
     sidecar.parts.push_back({part.name, static_cast<int>(part.points.rows())});
   sidecar.vertex_order = layout.order;
   sidecar.fps = scene.fps;
+  sidecar.clip_start = character.the_clip().start;
   sidecar.first_frame = frames.first;
   sidecar.num_frames = frames.last - frames.first + 1;
   const bool si = scene.output_space == OutputSpace::Si;

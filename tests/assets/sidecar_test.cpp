@@ -17,6 +17,7 @@ Sidecar example() {
   sidecar.parts = {{"body", 2}, {"eye", 1}};
   sidecar.vertex_order = VertexOrder::Importer;
   sidecar.fps = 24.0;
+  sidecar.clip_start = 10.5;
   sidecar.first_frame = 5;
   sidecar.num_frames = 9;
   sidecar.metres_per_unit = 0.01;
@@ -42,6 +43,7 @@ TEST(SidecarJson, SaysWhatAReaderOfTheCacheNeeds) {
   EXPECT_EQ(json["vertex_count"], 3);
   EXPECT_EQ(json["rest_hash"]["value"].get<std::string>().size(), 16u);
   EXPECT_EQ(json["fps"], 24.0);
+  EXPECT_EQ(json["clip_start_s"], 10.5);
   EXPECT_EQ(json["first_frame"], 5);
   EXPECT_EQ(json["frame_count"], 9);
   EXPECT_EQ(json["units"]["metres_per_unit"], 0.01);
