@@ -144,13 +144,30 @@ void add_group(const Character& c, const std::vector<int>& bones, const std::str
   groups.push_back(joints);
 }
 
+/// Joints that own no bone, with the bones of the frame that their flesh follows.
+std::vector<MergedJoint> merged_joints(const Character& c) {
+  const lattice::ControlLattice& lattice = c.lattice.lattice;
+  std::map<int, std::vector<int>> bones_of_frame;
+  for (std::size_t b = 0; b < lattice.bones.size(); ++b)
+    bones_of_frame[lattice.bones[b].frame].push_back(static_cast<int>(b));
+  std::vector<MergedJoint> merged;
+  for (std::size_t j = 0; j < lattice.frame_of_joint.size(); ++j) {
+    const int frame = lattice.frame_of_joint[j];
+    if (frame == static_cast<int>(j) || !bones_of_frame.contains(frame)) continue;
+    merged.push_back({c.rig.skeleton.joint(static_cast<int>(j)).name, c.rig.skeleton.joint(frame).name,
+                      bones_of_frame[frame]});
+  }
+  return merged;
+}
+
 /// What the scene says of single bones, one material after the other.
-void paint_bones(const Scene& scene, Character& c) {
+void paint_bones(const Scene& scene, const Talk& talk, Character& c) {
   fem::BodyOptions& body = c.body_options;
   const lattice::ControlLattice& lattice = c.lattice.lattice;
   std::vector<std::string> names;
   for (const auto& bone : lattice.bones) names.push_back(bone.name);
-  const std::vector<std::vector<int>> bones = bones_of_materials(scene, c.rig.file, names);
+  const std::vector<std::vector<int>> bones =
+      bones_of_materials(scene, c.rig.file, names, merged_joints(c), talk);
   std::map<std::string, std::vector<int>> of_region;
   for (std::size_t i = 0; i < scene.materials.size(); ++i) {
     const BoneMaterial& m = scene.materials[i];
@@ -204,7 +221,7 @@ void paint_regions(const Scene& scene, Character& c) {
 }
 
 /// The scene's materials: E by the scene or by default, then what the scene says of single bones.
-void settle_materials(const Scene& scene, Character& c) {
+void settle_materials(const Scene& scene, const Talk& talk, Character& c) {
   fem::BodyOptions& body = c.body_options;
   if (!scene.plain) {
     const fem::DefaultMaterials defaults = default_materials(scene, c);
@@ -225,7 +242,7 @@ void settle_materials(const Scene& scene, Character& c) {
     body.material.young = *scene.young;
     body.materials.clear();
   }
-  paint_bones(scene, c);
+  paint_bones(scene, talk, c);
   paint_regions(scene, c);
 }
 
@@ -260,6 +277,29 @@ lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::s
   for (const auto& [joint, factor] : factors) options.size_factors.push_back({joint, factor});
   options.poll.ask = [] { stop_if_interrupted("while building the lattice"); };
   return options;
+}
+
+void hang_idle_sizes(const assets::LatticeInput& input, const Talk& talk, lattice::BuildOptions& options) {
+  const lattice::JointTree& tree = input.joints;
+  std::vector<bool> has_skin(tree.names.size(), false), sized(tree.names.size(), false);
+  for (const auto& influences : input.skin.surface.weights) {
+    for (const lattice::Influence& influence : influences)
+      if (influence.weight > 0.0) has_skin[static_cast<std::size_t>(influence.frame)] = true;
+  }
+  for (const lattice::SizeFactor& size : options.size_factors)
+    sized[static_cast<std::size_t>(size.joint)] = true;
+  for (lattice::SizeFactor& size : options.size_factors) {
+    int above = size.joint;
+    while (above >= 0 && !has_skin[static_cast<std::size_t>(above)])
+      above = tree.parents[static_cast<std::size_t>(above)];
+    // What is left without skin is idle, and said to be.
+    if (above < 0 || sized[static_cast<std::size_t>(above)]) continue;
+    talk(fmt::format("[[size]]: no skin hangs on '{}'; cells are sized at '{}', on which it hangs",
+                     tree.names[static_cast<std::size_t>(size.joint)],
+                     tree.names[static_cast<std::size_t>(above)]));
+    sized[static_cast<std::size_t>(above)] = true;
+    size.joint = above;
+  }
 }
 
 void warn_of_idle_sizes(const lattice::BuildResult& result, const std::vector<std::string>& joints,
@@ -297,7 +337,8 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
   }
   {
     const Phase phase(c.times, "lattice");
-    const lattice::BuildOptions options = build_options(scene, c.input.joints.names);
+    lattice::BuildOptions options = build_options(scene, c.input.joints.names);
+    hang_idle_sizes(c.input, talk, options);
     if (scene.lattice.empty()) {
       check_lattice_memory(scene, c.input.skin.surface);
       const std::string folder =
@@ -356,17 +397,17 @@ Character make_character(const Scene& scene, const Talk& talk) {
   } else {
     load_rig(scene, talk, c);
   }
-  settle_flesh(scene, c);
+  settle_flesh(scene, c, talk);
   return c;
 }
 
-void settle_flesh(const Scene& scene, Character& c) {
+void settle_flesh(const Scene& scene, Character& c, const Talk& talk) {
   fem::BodyOptions& body = c.body_options;
   body.levels = scene.levels;
   body.material.poisson = scene.poisson;
   body.material.density = scene.density;
   body.damping = {scene.damping, scene.damping_frequency};
-  settle_materials(scene, c);
+  settle_materials(scene, talk, c);
 }
 
 namespace {

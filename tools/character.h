@@ -45,7 +45,7 @@ Character make_character(const Scene& scene, const Talk& talk);
 
 /// The last part of it: damping, materials, pulls and regions for a rig, a clip and a lattice that are there.
 /// Throws assets::ConfigError and assets::InputError for a bone or region that is not there.
-void settle_flesh(const Scene& scene, Character& character);
+void settle_flesh(const Scene& scene, Character& character, const Talk& talk);
 
 /// How a lattice of the user's is read.
 assets::ReadLatticeOptions read_options(const Scene& scene, const assets::Rig& rig);
@@ -53,6 +53,10 @@ assets::ReadLatticeOptions read_options(const Scene& scene, const assets::Rig& r
 /// The builder's options for a scene and the names of a rig's joints. Throws assets::ConfigError for a
 /// pattern that fits no joint, naming the nearest. A build with them throws Interrupted when a signal came.
 lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::string>& joints);
+
+/// Moves sizes from joints without skin to the nearest above that has some and no size of its own, and says
+/// so.
+void hang_idle_sizes(const assets::LatticeInput& input, const Talk& talk, lattice::BuildOptions& options);
 
 /// Says which joints the scene sizes cells at in vain.
 void warn_of_idle_sizes(const lattice::BuildResult& result, const std::vector<std::string>& joints,

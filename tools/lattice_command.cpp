@@ -177,10 +177,13 @@ std::string lattice_report(const lattice::BuildResult& result, const lattice::Jo
 
 namespace {
 
+void say(const std::string& line) { fmt::print(stderr, "{}\n", single_line(line)); }
+
 /// The user's lattice, or one that is built or found in the cache.
 assets::CachedBuild make_lattice(const Scene& scene, const assets::Rig& rig,
                                  const assets::LatticeInput& input) {
-  const lattice::BuildOptions options = build_options(scene, input.joints.names);
+  lattice::BuildOptions options = build_options(scene, input.joints.names);
+  hang_idle_sizes(input, say, options);
   assets::CachedBuild built;
   if (!scene.lattice.empty()) {
     built.result.lattice = assets::read_lattice(scene.lattice, input, read_options(scene, rig));
@@ -194,8 +197,7 @@ assets::CachedBuild make_lattice(const Scene& scene, const assets::Rig& rig,
     built = assets::build_lattice(folder, input.skin.surface, input.joints, options);
     if (built.use == assets::CacheUse::Hit)
       fmt::print(stderr, "lattice: nothing changed, taken from {}\n", single_line(folder));
-    warn_of_idle_sizes(built.result, input.joints.names,
-                       [](const std::string& line) { fmt::print(stderr, "{}\n", single_line(line)); });
+    warn_of_idle_sizes(built.result, input.joints.names, say);
   } catch (const std::invalid_argument& error) {
     throw assets::InputError(scene.rig, error.what());
   }
@@ -215,7 +217,7 @@ int clip_of(const Scene& scene, const assets::Rig& rig) {
 /// What a simulation would make of the lattice, to look at: fill, materials and weights of the regions.
 assets::LatticeFields fields_to_see(const Scene& scene, Character& character) {
   const lattice::ControlLattice& lattice = character.lattice.lattice;
-  settle_flesh(scene, character);
+  settle_flesh(scene, character, say);
   if (lattice.complex.cells.size() > kMostPaintedCells) {
     fmt::print(stderr, "  the file holds no materials and regions, as there are more than {} cells\n",
                kMostPaintedCells);

@@ -220,16 +220,31 @@ std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::
 }
 
 std::vector<std::vector<int>> bones_of_materials(const Scene& scene, const std::string& rig_file,
-                                                 const std::vector<std::string>& bone_names) {
+                                                 const std::vector<std::string>& bone_names,
+                                                 const std::vector<MergedJoint>& merged,
+                                                 const std::function<void(const std::string&)>& say) {
+  std::vector<std::string> merged_names;
+  for (const MergedJoint& joint : merged) merged_names.push_back(joint.name);
   std::vector<std::vector<int>> bones;
   for (std::size_t m = 0; m < scene.materials.size(); ++m) {
     std::set<int> chosen;
     for (const std::string& pattern : scene.materials[m].bones) {
       const std::vector<int> found = matching(pattern, bone_names);
       chosen.insert(found.begin(), found.end());
-      if (found.empty())
+      if (!found.empty()) continue;
+      const std::vector<int> joints = matching(pattern, merged_names);
+      if (joints.empty())
         throw assets::InputError(rig_file,
                                  fmt::format("material {}: {}", m + 1, no_such_bone(pattern, bone_names)));
+      for (const int j : joints) {
+        const MergedJoint& joint = merged[static_cast<std::size_t>(j)];
+        chosen.insert(joint.bones.begin(), joint.bones.end());
+        if (say)
+          say(fmt::format(
+              "material {}: the lattice has no bone for joint '{}'; the flesh of '{}' is meant, into "
+              "which it was merged",
+              m + 1, joint.name, joint.into));
+      }
     }
     bones.emplace_back(chosen.begin(), chosen.end());
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -189,9 +190,19 @@ std::string no_such_bone(const std::string& pattern, const std::vector<std::stri
 std::vector<int> joints_of(const std::vector<std::string>& patterns, const std::vector<std::string>& names,
                            const std::string& where);
 
-/// For every material the bones that it is for; none for one of regions. Throws assets::InputError (for
-/// `rig_file`) where a pattern fits no bone.
+/// A joint without a bone of its own, as the lattice merged it into another one.
+struct MergedJoint {
+  std::string name;
+  std::string into;        ///< the joint whose frame its flesh follows.
+  std::vector<int> bones;  ///< of that joint.
+};
+
+/// For every material the bones that it is for; none for one of regions. A pattern that fits no bone but a
+/// merged joint is for the bones of that which it was merged into, and `say` is told. Throws
+/// assets::InputError (for `rig_file`) where a pattern fits neither.
 std::vector<std::vector<int>> bones_of_materials(const Scene& scene, const std::string& rig_file,
-                                                 const std::vector<std::string>& bone_names);
+                                                 const std::vector<std::string>& bone_names,
+                                                 const std::vector<MergedJoint>& merged = {},
+                                                 const std::function<void(const std::string&)>& say = {});
 
 }  // namespace sinew::tools

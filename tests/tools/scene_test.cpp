@@ -318,6 +318,19 @@ TEST(SceneMaterials, FindTheBonesByPattern) {
       (std::vector<std::vector<int>>{{0, 1, 2, 3, 4, 5}, {0, 1, 3, 5}, {1}}));
 }
 
+TEST(SceneMaterials, OfAMergedJointAreForTheBonesItWasMergedInto) {
+  Scene scene;
+  scene.materials = {{{"toe", "hip"}, 1.0, {}, {}}, {{"*o*"}, 2.0, {}, {}}};
+  std::vector<std::string> said;
+  EXPECT_EQ(bones_of_materials(scene, "r.glb", {"hip", "foot", "foot.tip"}, {{"toe", "foot", {1, 2}}},
+                               [&](const std::string& line) { said.push_back(line); }),
+            (std::vector<std::vector<int>>{{0, 1, 2}, {1, 2}}));
+  // Where a pattern fits bones, those are meant.
+  EXPECT_EQ(said,
+            std::vector<std::string>{"material 1: the lattice has no bone for joint 'toe'; the flesh of "
+                                     "'foot' is meant, into which it was merged"});
+}
+
 TEST(SceneMaterials, RefuseAPatternThatFitsNoBone) {
   Scene scene;
   scene.materials = {{{"hip"}, 1.0, {}, {}}, {{"tial*"}, 2.0, {}, {}}};
