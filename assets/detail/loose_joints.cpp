@@ -163,7 +163,8 @@ Eigen::Affine3d invertible_local(const ImportedNode& node) {
 LooseRest hang_loose_joints(const ImportedScene& scene,
                             const std::vector<std::optional<Eigen::Affine3d>>& rest_from_node,
                             const std::vector<LooseJoint>& loose, double size) {
-  return Hanger(scene, rest_from_node, loose, size).run();
+  // A skin without extent has no size to compare ways with; any will do.
+  return Hanger(scene, rest_from_node, loose, size > 0.0 ? size : 1.0).run();
 }
 
 }  // namespace sinew::assets::detail

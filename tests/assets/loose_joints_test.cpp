@@ -170,6 +170,18 @@ TEST(LooseJoints, CountOnlyInTheSkinThatTheyCarry) {
     EXPECT_TRUE(map.isApprox(Eigen::Affine3d::Identity(), kRounding));
 }
 
+TEST(LooseJoints, ArePlacedWhereTheSkinHasNoExtent) {
+  Limb limb;
+  limb.scene.meshes[0].points.setZero();
+  skeleton::Channel channel;
+  channel.joint = Limb::kControl;
+  channel.translation = {skeleton::Interpolation::Linear, {0, 1}, {{0, 30, 0}, {0, 40, 0}}, {}, {}};
+  limb.scene.clips.push_back({"slide", 0, 0, 0, {channel}});
+  const Rig rig = build_rig("limb", limb.scene, {});
+  for (const skeleton::Joint& joint : rig.skeleton.joints())
+    EXPECT_TRUE(joint.rest_from_joint.matrix().allFinite()) << joint.name;
+}
+
 TEST(LooseJoints, AreNamedByThreeAndCounted) {
   Limb limb;
   for (int i = 0; i < 6; ++i) {
