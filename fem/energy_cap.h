@@ -30,6 +30,9 @@ class EnergyCap {
   void limit(const State& before, const PosedFrames& now, const PosedFrames& next,
              const lattice::Points* force, State& after);
 
+  /// The bones jumped: what the flesh had before says nothing any more.
+  void forget() { stored_.reset(); }
+
   const Taken& taken() const { return taken_; }
 
  private:

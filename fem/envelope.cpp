@@ -70,25 +70,27 @@ std::vector<std::string> outside_envelope(const Body& body, const Motion& motion
   Worst turn, jump, jolt, stretch, squeeze;
   PosedFrames before;
   std::vector<Eigen::Vector3d> ends_before, moved_before;
+  bool followed = false;  // in the step before flesh followed its bones: no start, and no cut
   for (long k = 0; k <= steps; ++k) {
     const double time = first + static_cast<double>(k) * step;
     const PosedFrames now = pose_frames(body.tree, motion(time), time);
     const std::vector<Eigen::Vector3d> ends = bone_ends(body, now.joints);
     std::vector<Eigen::Vector3d> moved(ends.size(), Eigen::Vector3d::Zero());
+    const bool follows = k > 0 && !touches_cut(options.cuts, time - step, time);
     for (std::size_t b = 0; b < body.lattice.bones.size(); ++b) {
       const lattice::LatticeBone& bone = body.lattice.bones[b];
       const double length = (bone.rest_end - bone.rest_start).norm();
       const double posed = (ends[2 * b + 1] - ends[2 * b]).norm();
       stretch.see(posed / length, time, bone.name);
       squeeze.see(length / posed, time, bone.name);
-      if (k == 0) continue;
+      if (!follows) continue;
       for (std::size_t e : {2 * b, 2 * b + 1}) {
         moved[e] = ends[e] - ends_before[e];
         jump.see(moved[e].norm() / body.size, time, bone.name);
-        if (k > 1) jolt.see((moved[e] - moved_before[e]).norm() / step, time, bone.name);
+        if (followed) jolt.see((moved[e] - moved_before[e]).norm() / step, time, bone.name);
       }
     }
-    for (std::size_t f = 0; k > 0 && f < now.frames.size(); ++f) {
+    for (std::size_t f = 0; follows && f < now.frames.size(); ++f) {
       const double chord = (now.frames[f].rotation - before.frames[f].rotation).norm();
       turn.see(2.0 * std::asin(std::min(1.0, chord / std::sqrt(8.0))) * 180.0 / std::numbers::pi, time,
                body.tree.frames[f].name);
@@ -96,6 +98,7 @@ std::vector<std::string> outside_envelope(const Body& body, const Motion& motion
     before = now;
     ends_before = ends;
     moved_before = moved;
+    followed = follows;
   }
 
   std::vector<std::string> warnings;

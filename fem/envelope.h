@@ -47,7 +47,7 @@ inline constexpr double kTestedWeightOfStvk = 0.03;
 inline constexpr double kTestedAspect = 1000.0;
 
 /// One sentence for each of these that body and motion leave, with the cell, or the bone and the time, where
-/// they do so most. `steps` steps of options.step from `first` [s].
+/// they do so most. `steps` steps of options.step from `first` [s]; those that touch a cut move no flesh.
 std::vector<std::string> outside_envelope(const Body& body, const Motion& motion,
                                           const SimulationOptions& options, double first, long steps);
 

@@ -168,23 +168,23 @@ SimulationReport Simulation::settle() {
     if (halvings == 0 && report.speed < options_.settle_speed) break;
   }
   // The motion may start at full speed: flesh that moves with its bones feels no jolt.
-  const PosedFrames next = pose_at(start_ + eta_h);
-  for (int a = 0; a < body_.mesh.num_vertices(); ++a) {
-    const Eigen::Vector3d x = state_.x.row(a).transpose();
-    Eigen::Vector3d moved = Eigen::Vector3d::Zero();
-    for (FrameWeights::InnerIterator it(body_.weights, a); it; ++it) {
-      const auto f = static_cast<std::size_t>(it.col());
-      moved += it.value() * (next.frames[f].from_rest * (now_.frames[f].to_rest * x));
-    }
-    state_.v.row(a) = (moved - x).transpose() / eta_h;
-  }
-  for (const BoneVertex& bone : body_.bones.vertices) {
-    state_.v.row(bone.vertex) =
-        (bone_position(bone, next.joints) - bone_position(bone, now_.joints)).transpose() / eta_h;
-  }
-  fill_inactive_leaves(body_, state_.v);
+  if (touches_cut(options_.cuts, start_, start_ + eta_h))
+    state_.v.setZero();
+  else
+    state_.v = riding_velocity(eta_h);
   before_ = state_;
   return report;
+}
+
+Points Simulation::riding_velocity(double span) const {
+  const PosedFrames next = pose_at(state_.time + span);
+  Points v = (carried(body_, state_.x, now_, next) - state_.x) / span;
+  for (const BoneVertex& bone : body_.bones.vertices) {
+    v.row(bone.vertex) =
+        (bone_position(bone, next.joints) - bone_position(bone, now_.joints)).transpose() / span;
+  }
+  fill_inactive_leaves(body_, v);
+  return v;
 }
 
 void Simulation::set_velocity(const Points& velocity) {
@@ -236,6 +236,47 @@ bool Simulation::jumps_to(const PosedFrames& next) const {
   return false;
 }
 
+void Simulation::forget_history() {
+  state_.x_past.resize(0, 3);
+  state_.v_past.resize(0, 3);
+  state_.a.resize(0, 3);
+  step_end_.reset();
+  has_before_ = false;
+  track_.clear();
+  if (energy_cap_) energy_cap_->forget();
+}
+
+SimulationReport Simulation::carry_through_cut() {
+  const double h = options_.step, begin = state_.time;
+  if (!relative_velocity_) {
+    // Before the first step nothing is known of the frames' velocity, and settled flesh has none.
+    relative_velocity_ = state_.v;
+    if (has_before_) *relative_velocity_ -= (state_.x - carried(body_, state_.x, now_, past_)) / last_h_;
+  }
+  PosedFrames next = pose_at(begin + h);
+  before_ = state_;
+  state_.time = next.time;
+  state_.x = carried(body_, state_.x, now_, next);
+  place_bones(body_, next, state_.x);
+  fill_inactive_leaves(body_, state_.x);
+  state_.v = *relative_velocity_ = turned(body_, *relative_velocity_, now_, next);
+  past_ = std::move(now_);
+  now_ = std::move(next);
+  forget_history();
+  if (!touches_cut(options_.cuts, now_.time, now_.time + h)) {
+    const Points riding = riding_velocity(stage_of(options_.integrator).eta * h);
+    state_.v += riding;
+    for (const BoneVertex& bone : body_.bones.vertices) state_.v.row(bone.vertex) = riding.row(bone.vertex);
+    fill_inactive_leaves(body_, state_.v);
+    relative_velocity_.reset();
+  }
+  SimulationReport report;
+  report.time = state_.time;
+  report.steps = 1;
+  check(report);
+  return report;
+}
+
 /// The step begins where the frames land, with flesh that stands among them as before, and they stand still.
 SimulationReport Simulation::step_after_cut(double h, const PosedFrames& next) {
   const State state = state_;
@@ -250,12 +291,7 @@ SimulationReport Simulation::step_after_cut(double h, const PosedFrames& next) {
   place_bones(body_, now_, state_.x);
   fill_inactive_leaves(body_, state_.x);
   state_.v = turned(body_, state.v, now, now_);
-  state_.x_past.resize(0, 3);
-  state_.v_past.resize(0, 3);
-  state_.a.resize(0, 3);
-  step_end_.reset();
-  has_before_ = false;
-  track_.clear();
+  forget_history();
   held_ = next;
   const SimulationReport report = step_once(h);
   held_.reset();
@@ -324,14 +360,18 @@ SimulationReport Simulation::advance_to(double time) {
   while (state_.time < time) {
     if (part_ == 0) {
       state_.time = now_.time = start_ + static_cast<double>(base_step_) * options_.step;
+    }
+    const bool in_cut =
+        part_ == 0 && info_->dynamic && touches_cut(options_.cuts, state_.time, state_.time + options_.step);
+    if (part_ == 0 && !in_cut) {
       const int wanted = halvings_for(state_.time, options_.step);
       if (wanted > halvings_ || (wanted < halvings_ && steps_since_change_ >= kStepsBetweenChanges)) {
         halvings_ = wanted;
         steps_since_change_ = 0;
       }
     }
-    const int parts = 1 << halvings_;
-    const SimulationReport report = step_once(options_.step / parts);
+    const int parts = in_cut ? 1 : 1 << halvings_;
+    const SimulationReport report = in_cut ? carry_through_cut() : step_once(options_.step / parts);
     if (report.status == SimulationStatus::NoConvergence && halvings_ < kMostHalvings) {
       ++halvings_;
       part_ *= 2;

@@ -5,18 +5,17 @@
 #include <string>
 #include <vector>
 
+#include "fem/cuts.h"
 #include "fem/energy_cap.h"
 #include "fem/loads.h"
 #include "fem/measures.h"
 #include "fem/models/model.h"
+#include "fem/motion.h"
 #include "fem/track.h"
 
 /// The time loop: settles the flesh, steps it along a motion, and samples it at any time between steps. Knows
 /// no files.
 namespace sinew::fem {
-
-/// pose_from_rest of every joint at a time [s]; must be defined for every time.
-using Motion = std::function<std::vector<Eigen::Affine3d>(double time)>;
 
 struct SimulationOptions {
   /// Step h [s]; > 0. Belongs to the scene, never to the frame rate: the held pose depends slightly on it.
@@ -34,6 +33,8 @@ struct SimulationOptions {
   Loads loads;
   /// Further forces on the leaf vertices at a time, num_vertices x 3 [N]; empty: none.
   std::function<lattice::Points(double time)> force;
+  /// Of the motion; steps that touch one carry the flesh along with its bones, and no time passes for it.
+  std::vector<Cut> cuts = {};
 
   /// Throws std::invalid_argument naming the field, its value and the rule it breaks.
   void validate() const;
@@ -50,9 +51,9 @@ struct SimulationReport {
   std::string message;
 };
 
-/// A frame that moves farther than this between two steps, in sizes of the body [-], was not moved but cut:
-/// at the default step nobody means the flesh to be dragged over a hundred of its lengths in a second. Longer
-/// steps reach it at lower speeds; the envelope warns of it.
+/// A frame that moves farther than this between two steps, in sizes of the body [-], was not moved but cut,
+/// whatever the options say: at the default step nobody means the flesh to be dragged over a hundred of its
+/// lengths in a second. Longer steps reach it at lower speeds; the envelope warns of it.
 inline constexpr double kCutJump = 1.0;
 
 class Simulation {
@@ -67,8 +68,9 @@ class Simulation {
   [[nodiscard]] SimulationReport settle();
 
   /// Steps, or sub-steps where a frame turns fast or the model's solve fails, until state().time >= time;
-  /// does nothing when it is there already. Where a frame jumps by more than kCutJump the flesh is carried
-  /// along with the frames and keeps its velocity: a cut gives it no push. Throws std::invalid_argument
+  /// does nothing when it is there already. In a cut, and where a frame jumps by more than kCutJump, the
+  /// flesh is carried along with the frames and keeps its velocity: that gives it no push. Throws
+  /// std::invalid_argument
   /// naming joint and time where the motion gives a frame that is not finite or has no volume; the state
   /// stays the last good one.
   [[nodiscard]] SimulationReport advance_to(double time);
@@ -101,6 +103,11 @@ class Simulation {
   PosedFrames pose_at(double time) const;
   int halvings_for(double begin, double h) const;
   SimulationReport step_once(double h);
+  /// Of flesh that rides on its frames, on average over a time from now on [m/s].
+  lattice::Points riding_velocity(double span) const;
+  /// One whole step in which the flesh keeps its place in its frames and its velocity relative to them.
+  SimulationReport carry_through_cut();
+  void forget_history();
   bool jumps_to(const PosedFrames& next) const;
   SimulationReport step_after_cut(double h, const PosedFrames& next);
   /// One stage to now + eta h, extrapolated to now + span with the pose `next`.
@@ -141,6 +148,8 @@ class Simulation {
     double h = 0.0;  ///< [s].
   };
   std::optional<StepEnd> step_end_;  ///< empty before the first step.
+  /// During a cut: the flesh's velocity relative to its frames [m/s].
+  std::optional<lattice::Points> relative_velocity_;
   std::optional<PosedFrames> held_;  ///< during a step after a cut: the pose that stands still.
   long base_step_ = 0;               ///< whole steps taken: time is start + n h, never a running sum.
   int part_ = 0;  ///< sub-steps taken of the step under way: a frame may be sampled between two of them.

@@ -61,6 +61,34 @@ Eigen::Quaterniond sample(const RotationTrack& track, double time) {
   return Eigen::Quaterniond(q.normalized());
 }
 
+namespace {
+
+template <typename Visitor>
+void visit_tracks(const Clip& clip, const Visitor& visit) {
+  for (const Channel& channel : clip.channels) {
+    if (channel.translation) visit(channel.translation->times, channel.translation->interpolation);
+    if (channel.rotation) visit(channel.rotation->times, channel.rotation->interpolation);
+    if (channel.scale) visit(channel.scale->times, channel.scale->interpolation);
+  }
+}
+
+}  // namespace
+
+std::vector<double> key_times(const Clip& clip) {
+  constexpr double kJustBefore = 1e-6;  // s; shorter than anything that steps or looks
+  std::vector<double> times;
+  visit_tracks(clip, [&](const std::vector<double>& keys, Interpolation interpolation) {
+    for (std::size_t k = 0; k < keys.size(); ++k) {
+      times.push_back(keys[k]);
+      if (k > 0 && interpolation == Interpolation::Step)
+        times.push_back(std::max(keys[k - 1], keys[k] - kJustBefore));
+    }
+  });
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
+}
+
 Pose sample(const Skeleton& skeleton, const Clip& clip, double time) {
   std::vector<Eigen::Affine3d> local;
   local.reserve(skeleton.joints().size());

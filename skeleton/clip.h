@@ -48,6 +48,10 @@ struct Clip {
   double duration() const { return end - start; }
 };
 
+/// The times between which all values of a clip move evenly [s], ascending and distinct: its keys, and just
+/// before each but the first of a track of steps, which jumps there.
+std::vector<double> key_times(const Clip& clip);
+
 Eigen::Vector3d sample(const VectorTrack& track, double time);
 Eigen::Quaterniond sample(const RotationTrack& track, double time);
 

@@ -458,6 +458,39 @@ fem::SimulationOptions simulation_options(const Scene& scene) {
   return options;
 }
 
+fem::SimulationOptions simulation_options(const Scene& scene, const Character& character,
+                                          const fem::Body& body) {
+  fem::SimulationOptions options = simulation_options(scene);
+  const fem::Motion motion = [&](double time) { return character.pose(time); };
+  const double t0 = character.the_clip().start;
+  const std::vector<double> keys = skeleton::key_times(character.the_clip());
+  for (const int frame : scene.cuts)
+    options.cuts.push_back(
+        fem::stated_cut(body.tree, motion, keys, t0 + (frame - 1) / scene.fps, t0 + frame / scene.fps));
+  for (const fem::Cut& found : fem::find_cuts(body.tree, body.size, motion, keys)) {
+    if (!fem::touches_cut(options.cuts, found.begin, found.end)) options.cuts.push_back(found);
+  }
+  return options;
+}
+
+void say_cuts(const Scene& scene, const Character& character, const std::vector<fem::Cut>& cuts,
+              const FrameRange& frames, const Talk& talk) {
+  const double t0 = character.the_clip().start;
+  for (const int frame : scene.cuts) {
+    if (frame <= frames.first || frame > frames.last)
+      talk(fmt::format("warning: cuts: there is no way to frame {} within frames {} to {}, so nothing is cut",
+                       frame, frames.first, frames.last));
+  }
+  for (const fem::Cut& cut : cuts) {
+    const double begin = (cut.begin - t0) * scene.fps, end = (cut.end - t0) * scene.fps;
+    if (end <= frames.first || begin >= frames.last) continue;
+    talk(
+        fmt::format("cut to frame {:.0f} ({}): the character jumps {:.3g} m from {:.4g} to {:.4g} s, and its "
+                    "flesh goes along",
+                    std::ceil(end - 1e-4), cut.stated ? "stated" : "found", cut.way, cut.begin, cut.end));
+  }
+}
+
 FrameRange frame_range(const Scene& scene, const Character& character, const Talk& talk) {
   const skeleton::Clip& clip = character.the_clip();
   FrameRange range{0, 0};

@@ -70,6 +70,13 @@ fem::Body paint_body(const Character& character);
 
 /// fem's options for a scene.
 fem::SimulationOptions simulation_options(const Scene& scene);
+/// The same with what the character's clip adds: cuts, found and stated.
+fem::SimulationOptions simulation_options(const Scene& scene, const Character& character,
+                                          const fem::Body& body);
+
+/// One sentence for every cut of a run over these frames, and for every frame stated in vain.
+void say_cuts(const Scene& scene, const Character& character, const std::vector<fem::Cut>& cuts,
+              const FrameRange& frames, const Talk& talk);
 
 /// Output frames, at the clip times t0 + k / fps: the scene's, or the whole clip. Where the clip scales flesh
 /// to nothing the whole clip ends before that, with a word; frames that the scene asks for and that reach it

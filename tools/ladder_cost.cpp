@@ -81,7 +81,7 @@ fem::Motion motion_of(const Character& character) {
 /// How long flesh takes to settle [s]: by the cheapest model of elements, as all of them take the same; the
 /// scene's limit where that would take long to say.
 double settling_time(const Scene& scene, const Level& level, double first) {
-  fem::SimulationOptions options = simulation_options(scene);
+  fem::SimulationOptions options = simulation_options(scene, level.character, level.body);
   options.model = fem::kDefaultModel;
   options.integrator = fem::Integrator::Bdf2;
   const Stopwatch watch;
@@ -93,7 +93,7 @@ double settling_time(const Scene& scene, const Level& level, double first) {
 
 /// A few steps in the middle of the motion.
 RungCost try_rung(const Scene& scene, const Level& level, double time) {
-  fem::SimulationOptions options = simulation_options(scene);
+  fem::SimulationOptions options = simulation_options(scene, level.character, level.body);
   options.settle_limit = std::min(options.settle_limit, options.step);
   RungCost cost;
   cost.vertices = level.body.mesh.num_vertices();

@@ -103,6 +103,12 @@ std::string report_json(const RunReport& report, const Character& character, con
   json["seconds"] = times;
   json["settle"] = {{"steps", report.settle_steps}, {"speed_left_m_per_s", report.settle_speed}};
 
+  json["cuts"] = Json::array();
+  for (const fem::Cut& cut : report.cuts)
+    json["cuts"].push_back({{"from_s", cut.begin},
+                            {"to_s", cut.end},
+                            {"way_m", cut.way},
+                            {"by", cut.stated ? "scene" : "clip"}});
   json["energy_cap"] = {{"steps", report.energy_taken.steps}, {"taken_J", report.energy_taken.energy}};
 
   double residual = 0.0, strain = 0.0, det = std::numeric_limits<double>::infinity();

@@ -29,6 +29,7 @@ struct RunReport {
   double settle_speed = 0.0;  ///< left when settling ended [m/s].
   fem::SolverCounts counts;
   fem::EnergyCap::Taken energy_taken;
+  std::vector<fem::Cut> cuts;  ///< of the clip.
   std::vector<FrameReport> frames;
 };
 

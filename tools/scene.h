@@ -145,6 +145,9 @@ struct Scene {
   double fps = 30.0;
   /// Unset: the whole clip.
   std::optional<FrameRange> frames;
+  /// Output frames that the character is cut to: on the way from the frame before it jumps, and its flesh
+  /// goes along; 1 ... 1e7. Cuts that the clip shows by themselves are found besides.
+  std::vector<int> cuts;
   /// Longest time that the flesh may take to settle before the first frame [s]; 0 ... 3600.
   double settle = 5.0;
   /// What is written is the rig's own skinning plus this share of (model - `skin`) [-]; 0 ... 10, 0 = plain

@@ -101,6 +101,14 @@ constexpr auto kFields = std::to_array<SceneField>({
      "(16 bits, the fastest; blended is off by 1e-4 of what a step changes)"},
     {"fps", &Scene::fps, "output frames per second", "fps", {0.1, 1e4}, "1/s", "30"},
     {"frames", &Scene::frames, "output frames A-B, both included; left out: the whole clip"},
+    {"cuts",
+     &Scene::cuts,
+     "output frames that the character is cut to, besides the cuts that are found: it jumps on the way from "
+     "the frame before, and its flesh goes along",
+     "frame",
+     {1, kMaxFrame},
+     "",
+     "31"},
     {"settle",
      &Scene::settle,
      "longest time to settle before the first frame",
@@ -328,6 +336,9 @@ void check_field(const Scene& scene, const SceneField& field, const std::string&
           [](PathMember) {},
           [&](ModelMember member) { check_model(scene.*(member.name), where); },
           [](std::vector<std::string> Scene::*) {},
+          [&](std::vector<int> Scene::*member) {
+            for (const int value : scene.*member) check_number(field, value, where);
+          },
           [](Switch Scene::*) {},
           [](Integrator Scene::*) {},
           [](std::optional<Precision> Scene::*) {},
@@ -389,6 +400,15 @@ void set_from_text(Scene& scene, const SceneField& field, std::string_view text,
           [&](PathMember member) { scene.*(member.path) = text; },
           [&](ModelMember member) { scene.*(member.name) = text; },
           [&](std::vector<std::string> Scene::*member) { scene.*member = parse_list(text); },
+          [&](std::vector<int> Scene::*member) {
+            (scene.*member).clear();
+            for (const std::string& entry : parse_list(text)) {
+              const auto value = parse_int(entry);
+              if (!value)
+                refuse(field, quoted(entry), "whole numbers with commas, " + range_text(field), where);
+              (scene.*member).push_back(*value);
+            }
+          },
           [&](Switch Scene::*member) { scene.*member = parse_choice<Switch>(kSwitchNames, text, where); },
           [&](int Scene::*member) {
             const auto value = parse_int(text);
@@ -426,6 +446,7 @@ std::string flag_text(const Scene& scene, const SceneField& field) {
           [&](std::vector<std::string> Scene::*member) {
             return fmt::format("{}", fmt::join(scene.*member, ","));
           },
+          [&](std::vector<int> Scene::*member) { return fmt::format("{}", fmt::join(scene.*member, ",")); },
           [&](Switch Scene::*member) { return choice(kSwitchNames, scene.*member); },
           [&](int Scene::*member) { return fmt::format("{}", scene.*member); },
           [&](double Scene::*member) { return number_text(scene.*member); },
@@ -454,6 +475,9 @@ std::string toml_value(const Scene& scene, const SceneField& field) {
           [&](bool Scene::*) { return text; },
           [&](std::vector<std::string> Scene::*member) { return toml_quoted(scene.*member, field.key); },
           [&](int Scene::*) { return text; },
+          [&](std::vector<int> Scene::*member) {
+            return fmt::format("[{}]", fmt::join(scene.*member, ", "));
+          },
           [&](double Scene::*) { return toml_number(text); },
           [&](std::optional<double> Scene::*) { return toml_number(text); },
           [&](Eigen::Vector3d Scene::*member) { return fmt::format("[{}]", fmt::join(scene.*member, ", ")); },

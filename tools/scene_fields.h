@@ -26,8 +26,9 @@ struct ModelMember {
 using SceneMember =
     std::variant<bool Scene::*, int Scene::*, double Scene::*, std::optional<double> Scene::*,
                  std::string Scene::*, PathMember, ModelMember, std::vector<std::string> Scene::*,
-                 Switch Scene::*, Eigen::Vector3d Scene::*, std::optional<FrameRange> Scene::*,
-                 Integrator Scene::*, std::optional<Precision> Scene::*, OutputSpace Scene::*>;
+                 std::vector<int> Scene::*, Switch Scene::*, Eigen::Vector3d Scene::*,
+                 std::optional<FrameRange> Scene::*, Integrator Scene::*, std::optional<Precision> Scene::*,
+                 OutputSpace Scene::*>;
 
 /// An interval of numbers.
 struct Range {

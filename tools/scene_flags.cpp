@@ -24,6 +24,7 @@ std::string placeholder(const SceneField& field) {
   if (!field.unit.empty()) return std::string(field.unit);
   if (std::holds_alternative<PathMember>(field.member)) return "FILE";
   if (std::holds_alternative<int Scene::*>(field.member)) return "N";
+  if (std::holds_alternative<std::vector<int> Scene::*>(field.member)) return "N,N,...";
   if (std::holds_alternative<double Scene::*>(field.member)) return "X";
   if (std::holds_alternative<std::optional<FrameRange> Scene::*>(field.member)) return "A-B";
   return "NAME";

@@ -148,6 +148,13 @@ class SceneReader : public detail::TomlReader {
                    const std::string& where) {
     scene_.*member = strings(node, where);
   }
+  void read_member(const SceneField& field, std::vector<int> Scene::*member, const toml::node& node,
+                   const std::string& where) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr) refuse_type(node, where, "an array of whole numbers, " + range_text(field));
+    (scene_.*member).clear();
+    for (const toml::node& entry : *array) (scene_.*member).push_back(integer_in(field, entry, where));
+  }
   void read_member(const SceneField&, PathMember member, const toml::node& node, const std::string& where) {
     const std::string path = string(node, where);
     scene_.*(member.path) = path.empty() ? "" : (directory_ / path).string();

@@ -362,12 +362,14 @@ void simulate(const Scene& scene, const Talk& talk) {
   lap("assemble");
   const auto motion = [&](double time) { return character.pose(time); };
   const double first = character.the_clip().start + frames.first / scene.fps;
+  const fem::SimulationOptions options = simulation_options(scene, character, body);
+  say_cuts(scene, character, options.cuts, frames, talk);
+  report.cuts = options.cuts;
   for (const std::string& warning :
-       fem::outside_envelope(body, motion, simulation_options(scene), first,
+       fem::outside_envelope(body, motion, options, first,
                              std::lround((frames.last - frames.first) / (scene.fps * scene.step))))
     talk("warning: " + warning);
-  fem::Simulation simulation(body, motion, first, simulation_options(scene),
-                             [] { return interrupt_signal() != 0; });
+  fem::Simulation simulation(body, motion, first, options, [] { return interrupt_signal() != 0; });
   const fem::SimulationReport settled = simulation.settle();
   lap("factor and settle");
   if (settled.status != fem::SimulationStatus::Ok) fail(character, settled, "settling");

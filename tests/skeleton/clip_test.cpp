@@ -47,6 +47,26 @@ TEST(VectorTrack, OneKeyIsAConstant) {
   for (const double t : {-1.0, 5.0, 6.0}) EXPECT_EQ(sample(track, t), Eigen::Vector3d(1, 2, 3));
 }
 
+TEST(Clip, MovesEvenlyBetweenItsKeyTimes) {
+  Clip clip;
+  clip.channels.resize(2);
+  clip.channels[0].joint = 0;
+  clip.channels[0].translation = ramp(Interpolation::Linear);  // keys at 1 and 3
+  clip.channels[1].joint = 1;
+  clip.channels[1].scale = ramp(Interpolation::Step);
+  clip.channels[1].scale->times = {1.0, 1.5};
+  const std::vector<double> times = key_times(clip);
+  ASSERT_EQ(times.size(), 4U);
+  EXPECT_EQ(times[0], 1.0);
+  // A track of steps is constant until just before its key, and jumps between that and the key.
+  EXPECT_EQ(sample(*clip.channels[1].scale, times[1]), clip.channels[1].scale->values[0]);
+  EXPECT_NEAR(times[1], 1.5, 1e-5);
+  EXPECT_LT(times[1], 1.5);
+  EXPECT_EQ(times[2], 1.5);
+  EXPECT_EQ(times[3], 3.0);
+  EXPECT_TRUE(key_times({}).empty());
+}
+
 TEST(VectorTrack, CubicSplineReproducesACubic) {
   // p(t) = t^3 - 2 t^2 + 3 t - 1 has tangents 3 t^2 - 4 t + 3: the Hermite spline through its keys is itself.
   const auto p = [](double t) { return ((t - 2) * t + 3) * t - 1; };

@@ -33,6 +33,24 @@ TEST_F(SceneFile, ReadsWhichBonesTakePartAndHowLargeCellsAre) {
             "scene.toml:1: bones_include: got a string, expected an array of strings");
 }
 
+TEST_F(SceneFile, ReadsToWhichFramesTheCharacterIsCut) {
+  EXPECT_EQ(read("cuts = [31, 60]").cuts, (std::vector<int>{31, 60}));
+  EXPECT_TRUE(read("cuts = []").cuts.empty());
+  EXPECT_EQ(refusal("cuts = 31"),
+            "scene.toml:1: cuts: got an integer, expected an array of whole numbers, 1 <= frame <= 10000000");
+  EXPECT_EQ(refusal("cuts = [31, 1.5]"),
+            "scene.toml:1: cuts: got a number, expected a whole number, 1 <= frame <= 10000000");
+  EXPECT_EQ(refusal("cuts = [0]"), "scene.toml:1: cuts: got 0, expected 1 <= frame <= 10000000; hint: 31");
+  // As flags have it, and as a printed scene does.
+  Scene scene;
+  const SceneField& field = *find_scene_field("cuts");
+  set_from_text(scene, field, "31, 60", "--cuts");
+  EXPECT_EQ(scene.cuts, (std::vector<int>{31, 60}));
+  EXPECT_EQ(flag_text(scene, field), "31,60");
+  EXPECT_EQ(toml_value(scene, field), "[31, 60]");
+  EXPECT_THROW(set_from_text(scene, field, "31,x", "--cuts"), assets::ConfigError);
+}
+
 TEST_F(SceneFile, TakesRegionsOfALatticeByNameAndNumber) {
   const Scene scene = read("lattice = \"a.msh\"\n[[material]]\nregions = [\"belly\", 7]\nyoung = 100.0");
   EXPECT_EQ(scene.materials.at(0).regions, (std::vector<std::string>{"belly", "7"}));
