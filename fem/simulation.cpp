@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "fem/models/balance.h"
 #include "fem/placement.h"
 
 namespace sinew::fem {
@@ -13,8 +14,21 @@ using lattice::Points;
 
 namespace {
 
-constexpr int kMostHalvings = 8;          ///< of a step: for fast frames and for solves that fail.
-constexpr int kStepsBetweenChanges = 10;  ///< before a longer step: what turned fast may go on to.
+constexpr int kMostHalvings = 8;           ///< of a step: for fast frames and for solves that fail.
+constexpr double kLongestInterval = 0.05;  ///< between keys that show accelerations [s].
+constexpr int kStepsBetweenChanges = 10;   ///< before a longer step: what turned fast may go on to.
+
+/// M a over the leaf vertices [N].
+Points mass_times(const Body& body, const Points& a) {
+  const LeafMatrices& m = body.matrices;
+  Points result = Points::Zero(a.rows(), 3);
+  for (int row = 0; row < m.num_vertices(); ++row) {
+    for (int e = m.row_start[static_cast<std::size_t>(row)];
+         e < m.row_start[static_cast<std::size_t>(row) + 1]; ++e)
+      result.row(row) += m.mass[static_cast<std::size_t>(e)] * a.row(m.column[static_cast<std::size_t>(e)]);
+  }
+  return result;
+}
 
 /// A model by its name, for members that need one at once.
 const ModelInfo* model_named(const std::string& name) {
@@ -35,6 +49,8 @@ void SimulationOptions::validate() const {
   };
   require(step > 0.0 && std::isfinite(step), "step", step, "a positive number of seconds");
   require(settle_limit >= 0.0, "settle", settle_limit, ">= 0 s");
+  require(settle_speed.value_or(1.0) > 0.0, "settle_speed", settle_speed.value_or(1.0), "> 0 m/s");
+  require(key_interval >= 0.0 && std::isfinite(key_interval), "key_interval", key_interval, ">= 0 s");
   require(gravity.allFinite(), "gravity", gravity.norm(), "finite numbers");
   require(solver.rings >= 0, "rings", solver.rings, ">= 0");
   model_named(model);
@@ -88,6 +104,18 @@ SimulationReport Simulation::failed(const SolveReport& solve) const {
   return report;
 }
 
+std::string Simulation::joint_of(int vertex) const {
+  double largest = -1.0;
+  int frame = 0;
+  for (FrameWeights::InnerIterator it(body_.weights, vertex); it; ++it) {
+    if (it.value() > largest) {
+      largest = it.value();
+      frame = static_cast<int>(it.col());
+    }
+  }
+  return body_.tree.frames[static_cast<std::size_t>(frame)].name;
+}
+
 bool Simulation::check(SimulationReport& report) const {
   int worst = -1;
   for (Eigen::Index a = 0; a < state_.x.rows() && worst < 0; ++a) {
@@ -107,18 +135,9 @@ bool Simulation::check(SimulationReport& report) const {
     }
   }
   if (worst < 0) return true;
-  double largest = -1.0;
-  int frame = 0;
-  for (FrameWeights::InnerIterator it(body_.weights, worst); it; ++it) {
-    if (it.value() > largest) {
-      largest = it.value();
-      frame = static_cast<int>(it.col());
-    }
-  }
   report.status = SimulationStatus::Diverged;
-  report.message = "the flesh of '" + body_.tree.frames[static_cast<std::size_t>(frame)].name +
-                   "' diverged at " + std::to_string(state_.time) + " s (lattice vertex " +
-                   std::to_string(worst) +
+  report.message = "the flesh of '" + joint_of(worst) + "' diverged at " + std::to_string(state_.time) +
+                   " s (lattice vertex " + std::to_string(worst) +
                    "); a smaller --step, more --damping or --integrator backward-euler helps";
   return false;
 }
@@ -126,14 +145,20 @@ bool Simulation::check(SimulationReport& report) const {
 SimulationReport Simulation::settle() {
   SimulationReport report;
   report.time = state_.time;
-  const double eta_h = stage_of(options_.integrator).eta * options_.step;
   // At most one and a half stages at once: a stiff mode that is carried twice as far never comes to rest.
   const double span = std::min(1.0, 1.5 * stage_of(options_.integrator).eta);
   const long limit =
       info_->dynamic ? std::lround(std::ceil(options_.settle_limit / options_.step)) : 0;  // steps
+  const double slow = options_.settle_speed.value_or(kSettledRate * body_.size);
+  const Beginning begin = beginning();
+  if (limit > 0) {
+    if (!begin.acceleration.isZero(0.0)) inertial_force_ = -mass_times(body_, begin.acceleration);
+    state_.x = guessed_rest();
+  }
   PosedFrames earlier = now_, later = now_;
   Points v;
   int halvings = 0, good_steps = 0;
+  report.settled = limit == 0;
   for (long n = 0; n < limit; ++n) {
     const double h = options_.step * std::exp2(-halvings);
     earlier.time = now_.time - h;
@@ -148,32 +173,96 @@ SimulationReport Simulation::settle() {
       good_steps = 0;
       continue;
     }
-    if (!solve.ok()) return failed(solve);
+    if (!solve.ok()) {
+      inertial_force_.resize(0, 3);
+      return failed(solve);
+    }
     // Implicit drag at the critical rate 2 w0: the equilibrium is that of the run's own matrices.
     const double keep = 1.0 / (1.0 + 4.0 * std::numbers::pi * body_.damping.frequency * h);
     state_.x += span * h * v;
     state_.v = keep * v;
     place_bones(body_, now_, state_.x);
     ++report.steps;
-    report.speed = v.rowwise().norm().maxCoeff();
-    if (!check(report)) return report;
-    if (should_stop_ && should_stop_()) {
-      report.status = SimulationStatus::Stopped;
+    Eigen::Index fastest = 0;
+    report.speed = v.rowwise().norm().maxCoeff(&fastest);
+    report.fastest = joint_of(static_cast<int>(fastest));
+    const bool good = check(report);
+    if (good && should_stop_ && should_stop_()) report.status = SimulationStatus::Stopped;
+    if (report.status != SimulationStatus::Ok) {
+      inertial_force_.resize(0, 3);
       return report;
     }
     if (halvings > 0 && ++good_steps == kStepsBetweenChanges) {
       --halvings;
       good_steps = 0;
     }
-    if (halvings == 0 && report.speed < options_.settle_speed) break;
+    report.settled = halvings == 0 && report.speed < slow;
+    if (report.settled) break;
   }
-  // The motion may start at full speed: flesh that moves with its bones feels no jolt.
-  if (touches_cut(options_.cuts, start_, start_ + eta_h))
-    state_.v.setZero();
-  else
-    state_.v = riding_velocity(eta_h);
+  inertial_force_.resize(0, 3);
+  state_.v = begin.velocity;
   before_ = state_;
   return report;
+}
+
+/// Where a motion goes on evenly from key to key, its accelerations are differences over keys. One that
+/// begins within a key or two, as a start from rest does, is none that the flesh could have settled under: as
+/// far as the second such difference is another one than the first, it does not count.
+Simulation::Beginning Simulation::beginning() const {
+  constexpr double kRounding = 1e-12;  // of places
+  const double eta_h = stage_of(options_.integrator).eta * options_.step;
+  const double interval = std::max(options_.step, options_.key_interval);
+  Beginning begin{Points::Zero(state_.x.rows(), 3), Points::Zero(state_.x.rows(), 3)};
+  if (touches_cut(options_.cuts, start_, start_ + eta_h)) return begin;
+  // The motion may start at full speed: flesh that moves with its bones feels no jolt.
+  begin.velocity = riding_velocity(eta_h);
+  if (!info_->dynamic || interval > kLongestInterval ||
+      touches_cut(options_.cuts, start_, start_ + 3.0 * interval))
+    return begin;
+  const auto at = [&](int keys) {
+    const PosedFrames posed = pose_at(start_ + keys * interval);
+    Points x = carried(body_, state_.x, now_, posed);
+    place_bones(body_, posed, x);
+    return x;
+  };
+  const Points x1 = at(1), x2 = at(2), x3 = at(3);
+  const double rounding = kRounding * (body_.size + state_.x.cwiseAbs().maxCoeff());
+  for (Eigen::Index a = 0; a < x1.rows(); ++a) {
+    const Eigen::RowVector3d first = state_.x.row(a) - 2.0 * x1.row(a) + x2.row(a);
+    const Eigen::RowVector3d second = x1.row(a) - 2.0 * x2.row(a) + x3.row(a);
+    if (!(first.dot(second) > rounding * std::max(first.norm(), second.norm()))) continue;
+    const double lasts = first.dot(second) / std::max(first.squaredNorm(), second.squaredNorm());
+    // Of the cubic through the four places, but for what the first stage, whose bones go the mean of its
+    // velocities, would else take for a jolt.
+    const Eigen::RowVector3d acceleration = (2.0 * first - second) / (interval * interval);
+    const Eigen::RowVector3d tangent =
+        (x1.row(a) - state_.x.row(a) - first / 2.0 + (second - first) / 3.0) / interval -
+        0.5 * eta_h * acceleration;
+    begin.acceleration.row(a) = lasts * acceleration;
+    begin.velocity.row(a) += lasts * (tangent - begin.velocity.row(a));
+  }
+  fill_inactive_leaves(body_, begin.acceleration);
+  fill_inactive_leaves(body_, begin.velocity);
+  return begin;
+}
+
+/// Of a law that is linear in the rotations of the frames: one solve finds the rest. For flesh of other laws
+/// that is a good place to start from as long as it is far from where such laws fail.
+Points Simulation::guessed_rest() const {
+  constexpr std::string_view kLinear = "blended-stiffness";
+  constexpr double kLeastStretch = 0.5;
+  SolverOptions exact = options_.solver;
+  exact.precision = Precision::Double;
+  const std::unique_ptr<Model> linear = find_model(kLinear)->make(body_, exact);
+  Points sum = inertial_force_.rows() > 0 ? inertial_force_ : Points::Zero(state_.x.rows(), 3);
+  if (!options_.loads.empty()) sum += loads_.at(state_.x);
+  if (options_.force) sum += options_.force(start_);
+  Points x = state_.x;
+  const bool found = linear->equilibrate({&now_, options_.gravity, &sum}, x).ok() && x.allFinite();
+  const bool same_law = info_->name == kLinear || model_->linear_in_frames();
+  if (!found || (x - state_.x).cwiseAbs().maxCoeff() > body_.size) return state_.x;
+  if (!same_law && least_stretch(body_, x).stretch < kLeastStretch) return state_.x;
+  return x;
 }
 
 Points Simulation::riding_velocity(double span) const {

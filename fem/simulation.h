@@ -23,7 +23,8 @@ struct SimulationOptions {
   Integrator integrator = Integrator::Bdf2;
   Eigen::Vector3d gravity{0.0, -9.81, 0.0};  ///< [m/s^2].
   double settle_limit = 5.0;                 ///< longest settling [s]; >= 0.
-  double settle_speed = 1e-3;                ///< settled when nothing moves faster [m/s].
+  /// Settled when nothing moves faster [m/s]; left out: kSettledRate sizes of the body a second.
+  std::optional<double> settle_speed;
   /// A frame that turns more in one step halves the step, again and again [rad].
   double largest_turn = 15.0 * 3.14159265358979323846 / 180.0;
   /// Which model of the flesh steps: a name of the registry (fem/models/model.h).
@@ -33,6 +34,9 @@ struct SimulationOptions {
   Loads loads;
   /// Further forces on the leaf vertices at a time, num_vertices x 3 [N]; empty: none.
   std::function<lattice::Points(double time)> force;
+  /// How far apart the keys are that the motion moves evenly between [s]; >= 0. Its accelerations are taken
+  /// over that time at least, or over a step where it is longer.
+  double key_interval = 0.0;
   /// Of the motion; steps that touch one carry the flesh along with its bones, and no time passes for it.
   std::vector<Cut> cuts = {};
 
@@ -45,11 +49,17 @@ enum class SimulationStatus { Ok, NotPositiveDefinite, NoConvergence, Diverged, 
 /// How a call ended; `message` names time and place.
 struct SimulationReport {
   SimulationStatus status = SimulationStatus::Ok;
-  double time = 0.0;   ///< of the last good state [s].
-  int steps = 0;       ///< taken by this call.
-  double speed = 0.0;  ///< settle: largest speed left [m/s].
+  double time = 0.0;    ///< of the last good state [s].
+  int steps = 0;        ///< taken by this call.
+  double speed = 0.0;   ///< settle: largest speed left [m/s],
+  std::string fastest;  ///< and the joint whose flesh has it.
+  bool settled = true;  ///< settle: that is slow enough, or nothing was to settle.
   std::string message;
 };
+
+/// Flesh that moves by less of the body's size in a second is at rest [1/s]. Twice that would be 0.1 % of the
+/// height of a body that is half as high as the diagonal of its box is long.
+inline constexpr double kSettledRate = 5e-4;
 
 /// A frame that moves farther than this between two steps, in sizes of the body [-], was not moved but cut,
 /// whatever the options say: at the default step nobody means the flesh to be dragged over a hundred of its
@@ -63,8 +73,10 @@ class Simulation {
   Simulation(const Body& body, Motion motion, double start_time, const SimulationOptions& options,
              std::function<bool()> should_stop = {});
 
-  /// Lets the flesh come to rest in the starting pose, critically damped at the damping frequency; then gives
-  /// it the motion's velocity, so that nothing jolts at the first frame. Same step and matrices as the run.
+  /// Lets the flesh come to rest in the starting pose, critically damped at the damping frequency, by steps
+  /// of the same length and matrices as the run's; they start where the flesh of linear laws rests, by one
+  /// solve. Rests under the loads, gravity and the accelerations that the motion begins with; then has the
+  /// motion's velocity, so that nothing jolts at the first frame.
   [[nodiscard]] SimulationReport settle();
 
   /// Steps, or sub-steps where a frame turns fast or the model's solve fails, until state().time >= time;
@@ -105,6 +117,15 @@ class Simulation {
   SimulationReport step_once(double h);
   /// Of flesh that rides on its frames, on average over a time from now on [m/s].
   lattice::Points riding_velocity(double span) const;
+  /// How the motion begins, of flesh that rides on its frames: accelerations as far as they last, and
+  /// velocities [m/s^2], [m/s].
+  struct Beginning {
+    lattice::Points acceleration, velocity;
+  };
+  Beginning beginning() const;
+  /// A guess of where the flesh rests, by one linear solve; as skinned where there is none.
+  lattice::Points guessed_rest() const;
+  std::string joint_of(int vertex) const;
   /// One whole step in which the flesh keeps its place in its frames and its velocity relative to them.
   SimulationReport carry_through_cut();
   void forget_history();
@@ -133,6 +154,8 @@ class Simulation {
   std::unique_ptr<Model> model_;
   LoadForces loads_;
   lattice::Points force_;  ///< of loads and options_.force, in the stage under way.
+  /// While the flesh settles: what the frames' acceleration takes from its weight [N]; else empty.
+  lattice::Points inertial_force_;
   double start_ = 0.0;
   State state_, before_;     ///< now and one step earlier, for sampling.
   PosedFrames now_, past_;   ///< their poses.

@@ -27,7 +27,9 @@ StageProblem Simulation::stage(const State& from, const Points& x_h, const Point
     const Points further = options_.force(time);
     force_ = options_.loads.empty() ? further : Points(force_ + further);
   }
-  if (!options_.loads.empty() || options_.force) problem.force = &force_;
+  const bool pushed = !options_.loads.empty() || options_.force;
+  if (inertial_force_.rows() > 0) force_ = pushed ? Points(force_ + inertial_force_) : inertial_force_;
+  if (pushed || inertial_force_.rows() > 0) problem.force = &force_;
   return problem;
 }
 

@@ -89,6 +89,17 @@ std::vector<double> key_times(const Clip& clip) {
   return times;
 }
 
+double key_interval(const Clip& clip) {
+  std::vector<double> intervals;
+  visit_tracks(clip, [&](const std::vector<double>& keys, Interpolation) {
+    for (std::size_t k = 1; k < keys.size(); ++k) intervals.push_back(keys[k] - keys[k - 1]);
+  });
+  if (intervals.empty()) return 0.0;
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return *middle;
+}
+
 Pose sample(const Skeleton& skeleton, const Clip& clip, double time) {
   std::vector<Eigen::Affine3d> local;
   local.reserve(skeleton.joints().size());

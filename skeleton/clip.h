@@ -52,6 +52,9 @@ struct Clip {
 /// before each but the first of a track of steps, which jumps there.
 std::vector<double> key_times(const Clip& clip);
 
+/// How far apart most keys of the clip are: the median over all tracks [s]; 0 where none has two.
+double key_interval(const Clip& clip);
+
 Eigen::Vector3d sample(const VectorTrack& track, double time);
 Eigen::Quaterniond sample(const RotationTrack& track, double time);
 

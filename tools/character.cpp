@@ -464,6 +464,7 @@ fem::SimulationOptions simulation_options(const Scene& scene, const Character& c
   const fem::Motion motion = [&](double time) { return character.pose(time); };
   const double t0 = character.the_clip().start;
   const std::vector<double> keys = skeleton::key_times(character.the_clip());
+  options.key_interval = skeleton::key_interval(character.the_clip());
   for (const int frame : scene.cuts)
     options.cuts.push_back(
         fem::stated_cut(body.tree, motion, keys, t0 + (frame - 1) / scene.fps, t0 + frame / scene.fps));

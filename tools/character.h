@@ -70,7 +70,7 @@ fem::Body paint_body(const Character& character);
 
 /// fem's options for a scene.
 fem::SimulationOptions simulation_options(const Scene& scene);
-/// The same with what the character's clip adds: cuts, found and stated.
+/// The same with what the character's clip adds: how dense its keys are, and cuts, found and stated.
 fem::SimulationOptions simulation_options(const Scene& scene, const Character& character,
                                           const fem::Body& body);
 

@@ -101,7 +101,10 @@ std::string report_json(const RunReport& report, const Character& character, con
   Json times = Json::object();
   for (const auto& [name, seconds] : report.times) times[name] = seconds;
   json["seconds"] = times;
-  json["settle"] = {{"steps", report.settle_steps}, {"speed_left_m_per_s", report.settle_speed}};
+  json["settle"] = {{"steps", report.settle_steps},
+                    {"speed_left_m_per_s", report.settle_speed},
+                    {"fastest", report.settle_joint},
+                    {"settled", report.settled}};
 
   json["cuts"] = Json::array();
   for (const fem::Cut& cut : report.cuts)

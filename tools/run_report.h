@@ -26,7 +26,9 @@ struct RunReport {
   std::string settings;  ///< the scene in force, TOML.
   PhaseTimes times;
   int settle_steps = 0;
-  double settle_speed = 0.0;  ///< left when settling ended [m/s].
+  double settle_speed = 0.0;  ///< left when settling ended [m/s],
+  std::string settle_joint;   ///< by the flesh of this joint.
+  bool settled = true;        ///< that is slow.
   fem::SolverCounts counts;
   fem::EnergyCap::Taken energy_taken;
   std::vector<fem::Cut> cuts;  ///< of the clip.

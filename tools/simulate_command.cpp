@@ -187,6 +187,24 @@ void say_what_runs(const Scene& scene, const Character& c, const FrameRange& fra
   for (const std::string& warning : outside_envelope(scene)) talk("warning: " + warning);
 }
 
+void say_settling(const Scene& scene, const fem::SimulationReport& settled, const fem::Body& body,
+                  const Talk& talk) {
+  if (settled.settled) {
+    if (settled.steps > 0)
+      talk(fmt::format("settled in {} steps; fastest flesh left {:.2g} mm/s", settled.steps,
+                       1e3 * settled.speed));
+    return;
+  }
+  // What a stable step leaves grows slower with more time; what it feeds, by another model.
+  const char* remedy = scene.model == "blended"
+                           ? "--model blended-stiffness, whose steps feed no motion"
+                           : "a longer --settle, stiffer flesh (--young) or more --damping";
+  talk(fmt::format(
+      "warning: not settled: the flesh of '{}' still moves at {:.3g} m/s after {} steps, where {:.2g} "
+      "is rest; hint: {}",
+      settled.fastest, settled.speed, settled.steps, fem::kSettledRate * body.size, remedy));
+}
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -377,8 +395,9 @@ void simulate(const Scene& scene, const Talk& talk) {
     simulation.set_velocity(starting_velocity(*scene.plain, simulation.state().x));
   report.settle_steps = settled.steps;
   report.settle_speed = settled.speed;
-  talk(
-      fmt::format("settled in {} steps; fastest flesh left {:.2g} mm/s", settled.steps, 1e3 * settled.speed));
+  report.settle_joint = settled.fastest;
+  report.settled = settled.settled;
+  say_settling(scene, settled, body, talk);
   const auto preview =
       run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
   lap("simulate and write frames");

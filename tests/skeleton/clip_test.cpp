@@ -67,6 +67,17 @@ TEST(Clip, MovesEvenlyBetweenItsKeyTimes) {
   EXPECT_TRUE(key_times({}).empty());
 }
 
+TEST(Clip, HasItsKeysAsFarApartAsMostOfThem) {
+  Clip clip;
+  EXPECT_EQ(key_interval(clip), 0.0);
+  clip.channels.resize(2);
+  clip.channels[0].translation = ramp(Interpolation::Linear);
+  EXPECT_EQ(key_interval(clip), 2.0);
+  clip.channels[1].scale = ramp(Interpolation::Linear);
+  clip.channels[1].scale->times = {0.0, 0.25, 0.5, 1.5};
+  EXPECT_EQ(key_interval(clip), 1.0);  // of 0.25, 0.25, 1 and 2 the larger one in the middle
+}
+
 TEST(VectorTrack, CubicSplineReproducesACubic) {
   // p(t) = t^3 - 2 t^2 + 3 t - 1 has tangents 3 t^2 - 4 t + 3: the Hermite spline through its keys is itself.
   const auto p = [](double t) { return ((t - 2) * t + 3) * t - 1; };
