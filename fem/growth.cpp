@@ -64,6 +64,19 @@ Growth growth(const Body& body, const PosedFrames& posed) {
   return g;
 }
 
+lattice::Points grown_places(const Body& body, const PosedFrames& posed, const Growth& growth) {
+  lattice::Points places = lattice::Points::Zero(body.mesh.num_vertices(), 3);
+  for (int a = 0; a < body.mesh.num_vertices(); ++a) {
+    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
+      const auto f = static_cast<std::size_t>(it.col());
+      const Eigen::Vector3d origin = posed.frames[f].from_rest * body.tree.frames[f].origin_rest;
+      const Eigen::Vector3d grown = growth.shape.row(a).transpose() - growth.origin[f];
+      places.row(a) += it.value() * (origin + posed.frames[f].rotation * grown).transpose();
+    }
+  }
+  return places;
+}
+
 namespace {
 
 /// T_f moved to put the middle of the tie where the grown shape has it.

@@ -32,6 +32,9 @@ bool scales_joints(const PosedFrames& posed);
 /// vertices, spread by body.bone_extension.
 Growth growth(const Body& body, const PosedFrames& posed);
 
+/// Y at its place among the frames, x = sum_f s_f [c_f + R_f (Y - Y_f)], num_vertices x 3 [m].
+lattice::Points grown_places(const Body& body, const PosedFrames& posed, const Growth& growth);
+
 /// Where tie `tie` pulls flesh to: T_b. In a body that grows, along a bone stretched as the bone is, and
 /// about a soft frame moved so that its middle is where the grown shape has it, turned with the frame: the
 /// frame of flesh that follows several joints pulls no dent into it. `growth`: of `posed`; null where nothing

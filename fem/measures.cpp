@@ -113,15 +113,8 @@ double tie_energy(const Body& body, const lattice::Points& x, const PosedFrames&
 /// 1/2 x^T S x, of what x is beside the grown shape where joints grow.
 double ghost_energy(const Body& body, const lattice::Points& x, const PosedFrames& posed,
                     const Growth* growth) {
-  lattice::Points from = x.rowwise() - Eigen::RowVector3d(x.row(0));
-  for (int a = 0; growth != nullptr && a < body.mesh.num_vertices(); ++a) {
-    for (FrameWeights::InnerIterator it(body.weights, a); it; ++it) {
-      const auto f = static_cast<std::size_t>(it.col());
-      const Eigen::Vector3d origin = posed.frames[f].from_rest * body.tree.frames[f].origin_rest;
-      const Eigen::Vector3d grown = growth->shape.row(a).transpose() - growth->origin[f];
-      from.row(a) -= it.value() * (origin + posed.frames[f].rotation * grown).transpose();
-    }
-  }
+  const lattice::Points from = growth == nullptr ? lattice::Points(x.rowwise() - Eigen::RowVector3d(x.row(0)))
+                                                 : lattice::Points(x - grown_places(body, posed, *growth));
   return 0.5 * from.cwiseProduct(apply_ghost(body.matrices, from)).sum();
 }
 

@@ -28,10 +28,11 @@ void over_vertices(const Body& body, const Action& action) {
 }
 
 /// Force of the ties on flesh at x.
-Points tie_pull(const Body& body, const PosedFrames& posed, const Points& x) {
+Points tie_pull(const Body& body, const PosedFrames& posed, const Points& x,
+                const std::optional<Growth>& growth) {
   Points target = Points::Zero(body.mesh.num_vertices(), 3);
   for (const Tie& tie : body.ties) {
-    const Eigen::Affine3d& map = posed.frames[static_cast<std::size_t>(tie.frame)].from_rest;
+    const Eigen::Affine3d map = tie_target(body, tie, posed, growth ? &*growth : nullptr);
     const Eigen::Vector3d centre = map * tie.centre_rest;
     for (std::size_t k = 0; k < tie.vertices.size(); ++k)
       target.row(tie.vertices[k]) += (map.linear() * tie.first[k] + tie.zeroth[k] * centre).transpose();
@@ -78,7 +79,7 @@ Points predicted_velocity(const Body& body, const State& state, const StagePoses
 
 }  // namespace
 
-Balance stage_balance(const Body& body, const StageProblem& p) {
+Balance stage_balance(const Body& body, const StageProblem& p, Grows grows) {
   const Stage stage = stage_of(p.integrator);
   const double eta_h = stage.eta * p.h, kappa_h = stage.kappa * p.h, alpha = body.damping.alpha();
   const State& state = *p.state;
@@ -96,8 +97,10 @@ Balance stage_balance(const Body& body, const StageProblem& p) {
   b.inertia = (of_velocity + alpha) / eta_h;
   b.origin = *p.x_h;
   b.target = (of_velocity * *p.v_h + (alpha / kappa_h) * (carried_past - b.origin)) / b.inertia;
-  b.pull = tie_pull(body, *p.poses.stage, b.origin) -
-           apply_ghost(body.matrices, (1.0 + b.damping) * b.origin - b.damping * carried_past);
+  if (grows == Grows::WithItsJoints && body.grows) b.growth = growth(body, *p.poses.stage);
+  Points kinked = (1.0 + b.damping) * b.origin - b.damping * carried_past;
+  if (b.growth) kinked -= grown_places(body, *p.poses.stage, *b.growth);
+  b.pull = tie_pull(body, *p.poses.stage, b.origin, b.growth) - apply_ghost(body.matrices, kinked);
   b.load = weights(body, p.gravity, p.force);
 
   Points place = state.x + p.elapsed * predicted_velocity(body, state, p.poses, p.elapsed);
@@ -107,13 +110,16 @@ Balance stage_balance(const Body& body, const StageProblem& p) {
   return b;
 }
 
-Balance rest_balance(const Body& body, const PoseProblem& problem, const Points& guess) {
+Balance rest_balance(const Body& body, const PoseProblem& problem, const Points& guess, Grows grows) {
   Balance b;
   b.pose = problem.pose;
   b.origin = guess;
   place_bones(body, *problem.pose, b.origin);
   fill_inactive_leaves(body, b.origin);
-  b.pull = tie_pull(body, *problem.pose, b.origin) - apply_ghost(body.matrices, b.origin);
+  if (grows == Grows::WithItsJoints && body.grows) b.growth = growth(body, *problem.pose);
+  Points kinked = b.origin;
+  if (b.growth) kinked -= grown_places(body, *problem.pose, *b.growth);
+  b.pull = tie_pull(body, *problem.pose, b.origin, b.growth) - apply_ghost(body.matrices, kinked);
   b.load = weights(body, problem.gravity, problem.force);
   b.guess = Points::Zero(guess.rows(), 3);
   return b;

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "fem/growth.h"
 #include "fem/models/cell_energy.h"
 #include "fem/models/model.h"
 
@@ -23,14 +25,19 @@ struct Balance {
   double damping = 0.0;               ///< stiffness damping, beta / (kappa h) [-]; 0 at rest.
   std::vector<PastPlace> past;        ///< what the strain's rate is measured against.
   const PosedFrames* pose = nullptr;  ///< at the solution.
+  std::optional<Growth> growth;       ///< there; only where flesh grows with its joints.
   lattice::Points guess;              ///< first guess of the move, in the space of the unknowns [m].
 };
 
+/// Whether flesh grows with joints that a clip scales (fem/growth.h) or keeps its own size.
+enum class Grows { No, WithItsJoints };
+
 /// Of a stage. The guess moves the flesh with its frames and lets it keep its velocity relative to them.
-Balance stage_balance(const Body& body, const StageProblem& problem);
+Balance stage_balance(const Body& body, const StageProblem& problem, Grows grows = Grows::No);
 
 /// At rest; `guess` as it comes, with bone vertices put on the pose.
-Balance rest_balance(const Body& body, const PoseProblem& problem, const lattice::Points& guess);
+Balance rest_balance(const Body& body, const PoseProblem& problem, const lattice::Points& guess,
+                     Grows grows = Grows::No);
 
 /// inertia M (target - move) + ties + load.
 struct OuterForces {

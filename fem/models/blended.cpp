@@ -80,7 +80,8 @@ class Blended final : public Model {
   SolveReport equilibrate(const PoseProblem& problem, lattice::Points& x) override;
 
   CellForces cell_forces(const lattice::Points& x, const PosedFrames& pose) override {
-    return RotatedStiffness(body_).forces(x, frame_rotations(body_, pose));
+    const lattice::Points rest = body_.grows ? growth(body_, pose).shape : body_.mesh.points;
+    return RotatedStiffness(body_).forces(x, frame_rotations(body_, pose), rest);
   }
 
   bool linear_in_frames() const override { return true; }

@@ -69,7 +69,7 @@ class RotatedModel final : public Model {
   SolveReport prepare(double, Integrator) override { return {}; }
 
   SolveReport solve_stage(const StageProblem& problem, Points& velocity) override {
-    const Balance balance = stage_balance(body_, problem);
+    const Balance balance = stage_balance(body_, problem, grows());
     Points move = balance.guess;
     // The midpoint rule takes nothing out of what an unbalanced stage puts in: a stiff block that spins by 6
     // degrees a step would gain as much again within a second.
@@ -85,7 +85,8 @@ class RotatedModel final : public Model {
   SolveReport equilibrate(const PoseProblem& problem, Points& x) override;
 
   CellForces cell_forces(const Points& x, const PosedFrames& pose) override {
-    return polar_ ? (*polar_)(x) : cells_.forces(x, rotations_(x, pose));
+    if (polar_) return (*polar_)(x);
+    return cells_.forces(x, rotations_(x, pose), body_.grows ? growth(body_, pose).shape : body_.mesh.points);
   }
 
   SolverCounts counts() const override {
@@ -98,6 +99,8 @@ class RotatedModel final : public Model {
   }
 
  private:
+  /// Polar rotations follow the places, not the joints: such flesh keeps its own size.
+  Grows grows() const { return polar_ ? Grows::No : Grows::WithItsJoints; }
   /// Residual that may be left of a stage [N].
   double enough_for(double h, const Points& residual) const {
     const double angle = 2.0 * std::numbers::pi * body_.damping.frequency * h;
@@ -149,10 +152,17 @@ std::vector<Rotations> RotatedModel::past_rotations(const Balance& balance) {
 Points RotatedModel::residual_of(const Balance& balance, const Rotations& rotations,
                                  const std::vector<Rotations>& past, const Points& move) {
   const Points x = balance.origin + move;
-  std::vector<detail::TurnedPlace> places{{1.0 + balance.damping, &x, &rotations},
-                                          {-1.0, &body_.mesh.points}};
+  std::vector<detail::TurnedPlace> places{{1.0 + balance.damping, &x, &rotations}};
   for (std::size_t k = 0; k < past.size(); ++k)
     places.push_back({-balance.damping * balance.past[k].share, balance.past[k].x, &past[k]});
+  // Strain is counted from the shape of its own time.
+  Points rest;
+  if (balance.growth) {
+    rest = (1.0 + balance.damping) * balance.growth->shape;
+    for (std::size_t k = 0; k < past.size(); ++k)
+      rest -= balance.damping * balance.past[k].share * growth(body_, *balance.past[k].pose).shape;
+  }
+  places.push_back({-1.0, balance.growth ? &rest : &body_.mesh.points});
   if (polar_) {
     near_collapse_ = (*polar_)(places, corner_forces_);
   } else {
@@ -340,7 +350,7 @@ SolveReport RotatedModel::solve_newton(const Balance& balance, double tolerance,
 }
 
 SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
-  const Balance balance = rest_balance(body_, problem, x);
+  const Balance balance = rest_balance(body_, problem, x, grows());
   Points move = balance.guess;
   if (polar_) {
     const SolveReport report = solve_newton(balance, options_.rest_tolerance, move);

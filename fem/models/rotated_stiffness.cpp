@@ -59,7 +59,8 @@ namespace {
 
 /// Energy 1/2 u^T f of cells with forces f.
 CellForces with_energy(const Body& body, const detail::CellGroups& groups, const Points& x,
-                       const std::vector<Eigen::Matrix3d>& rotations, const std::vector<double>& corners) {
+                       const std::vector<Eigen::Matrix3d>& rotations, const Points& rest,
+                       const std::vector<double>& corners) {
   CellForces result;
   result.energy.resize(rotations.size());
   result.force.resize(rotations.size());
@@ -67,7 +68,7 @@ CellForces with_energy(const Body& body, const detail::CellGroups& groups, const
     CellPoints force;
     for (int k = 0; k < 8; ++k) force.col(k) = groups.corner(static_cast<int>(c), k, corners);
     const CellPoints u =
-        cell_points(x, body.mesh.cells[c]) - rotations[c] * cell_points(body.mesh.points, body.mesh.cells[c]);
+        cell_points(x, body.mesh.cells[c]) - rotations[c] * cell_points(rest, body.mesh.cells[c]);
     result.energy[c] = 0.5 * u.cwiseProduct(force).sum();
     result.force[c] = Eigen::Map<const CellVector>(force.data());
   });
@@ -96,11 +97,12 @@ CellStiffness RotatedStiffness::rotated(int cell, const Eigen::Matrix3d& rotatio
   return result;
 }
 
-CellForces RotatedStiffness::forces(const Points& x, const std::vector<Eigen::Matrix3d>& rotations) const {
+CellForces RotatedStiffness::forces(const Points& x, const std::vector<Eigen::Matrix3d>& rotations,
+                                    const Points& rest) const {
   std::vector<double> corners;
-  const std::array<detail::TurnedPlace, 2> displacement{{{1.0, &x, &rotations}, {-1.0, &body_.mesh.points}}};
+  const std::array<detail::TurnedPlace, 2> displacement{{{1.0, &x, &rotations}, {-1.0, &rest}}};
   cells_->forces(rotations, displacement, corners);
-  return with_energy(body_, cells_->groups(), x, rotations, corners);
+  return with_energy(body_, cells_->groups(), x, rotations, rest, corners);
 }
 
 PolarForces::PolarForces(const Body& body, const RotatedStiffness& stiffness)
@@ -143,7 +145,8 @@ CellForces PolarForces::operator()(const Points& x) const {
   std::vector<char> slim;
   stiffness_.cells().polar_forces(mean_gradients_, displacement, corners, slim);
   // The forces of the turn do no work on y - X.
-  CellForces result = with_energy(body_, stiffness_.cells().groups(), x, rotations, corners);
+  CellForces result =
+      with_energy(body_, stiffness_.cells().groups(), x, rotations, body_.mesh.points, corners);
   each_near_collapse(x, slim, [&](std::size_t c, const PrincipalStretches& f, const CellPoints& force) {
     result.energy[c] += collapse_[c] * collapse_energy(f);
     result.force[c] += Eigen::Map<const CellVector>(force.data());

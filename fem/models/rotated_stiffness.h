@@ -51,8 +51,10 @@ class RotatedStiffness {
   CellStiffness at_rest(int cell) const;
   /// R K R^T.
   CellStiffness rotated(int cell, const Eigen::Matrix3d& rotation) const;
-  /// Energy 1/2 u^T K u and forces R K u of all cells.
-  CellForces forces(const lattice::Points& x, const std::vector<Eigen::Matrix3d>& rotations) const;
+  /// Energy 1/2 u^T K u and forces R K u of all cells, u = R^T x - rest; `rest`: the shape free of strain,
+  /// num_vertices x 3 [m].
+  CellForces forces(const lattice::Points& x, const std::vector<Eigen::Matrix3d>& rotations,
+                    const lattice::Points& rest) const;
 
   /// K as it is packed for products with all cells at once.
   const detail::TurnedCells& cells() const { return *cells_; }

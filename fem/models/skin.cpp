@@ -25,7 +25,7 @@ class Skin final : public Model {
 
   /// As linear flesh would answer in the rotation of its frames.
   CellForces cell_forces(const lattice::Points& x, const PosedFrames& pose) override {
-    return RotatedStiffness(body_).forces(x, frame_rotations(body_, pose));
+    return RotatedStiffness(body_).forces(x, frame_rotations(body_, pose), body_.mesh.points);
   }
 
   bool linear_in_frames() const override { return true; }
