@@ -80,9 +80,11 @@ CellMeasure measure_cell(const Body& body, std::size_t c, const lattice::Points&
   for_gauss_points(body, c, x, grown, [&](const PointMeasure& at) {
     Eigen::Matrix3d gradient = at.from_rest;  // F, from what is free of strain
     if (grown != nullptr) gradient *= at.growth.inverse();
-    out.det = std::min(out.det, gradient.determinant());
     const double fill = body.fill[c][static_cast<std::size_t>(at.index)];
-    if (fill >= kFleshy) out.strain = std::max(out.strain, stretch_strain(gradient));
+    if (fill >= kFleshy) {
+      out.det = std::min(out.det, gradient.determinant());
+      out.strain = std::max(out.strain, stretch_strain(gradient));
+    }
     sum.add(at, fill, rotation, body.materials[c].mu());
   });
   out.energy = sum.energy(body.materials[c].bulk());

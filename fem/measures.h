@@ -18,12 +18,12 @@ struct Measures {
   double ghost = 0.0;          ///< 1/2 x^T S x, of the ghost penalty [J].
   double largest_speed = 0.0;  ///< [m/s].
   double bone_residual = 0.0;  ///< largest distance of a bone vertex from the clip [m].
-  double largest_strain =
-      0.0;  ///< largest |principal stretch - 1| at a Gauss point of a mostly filled octant [-].
-  double min_det =
-      0.0;  ///< smallest det F at the Gauss points of the leaf cells (det J over rest det J) [-].
-  int min_det_cell = -1;
-  int inverted_cells = 0;  ///< leaf cells with det F <= 0 at a Gauss point.
+  // At Gauss points of octants that are at least half full: where there is hardly any flesh, nothing turns
+  // inside out that anybody could see.
+  double largest_strain = 0.0;  ///< largest |principal stretch - 1| [-].
+  double min_det = 0.0;         ///< smallest det F [-]; infinite where no octant is half full.
+  int min_det_cell = -1;        ///< leaf cell; -1 where no octant is half full.
+  int inverted_cells = 0;       ///< leaf cells with det F <= 0.
 };
 
 /// 1/2 v^T M v [J]; v: num_vertices x 3 [m/s].

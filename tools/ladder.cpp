@@ -20,6 +20,7 @@
 #include "tools/interrupt.h"
 #include "tools/ladder_cost.h"
 #include "tools/progress.h"
+#include "tools/run_report.h"
 #include "tools/scene_fields.h"
 #include "tools/simulate_command.h"
 
@@ -73,9 +74,13 @@ void read_costs(LadderRun& run) {
       run.phases.emplace_back(phase, seconds.get<double>());
       if (phase == "simulate and write frames") {
         run.per_frame = seconds.get<double>() / frames;
-      } else if (phase != "preview") {
+      } else if (phase != "preview" && phase != kJudging) {
         run.setup += seconds.get<double>();
       }
+    }
+    if (const auto skin = json.find("skin"); skin != json.end()) {  // a plain scene has none
+      run.verdict = skin->at("verdict").get<std::string>();
+      run.fault = skin->at("line").get<std::string>();
     }
   } catch (const nlohmann::json::exception& e) {
     throw assets::InputError(

@@ -27,6 +27,8 @@ struct LadderRun {
   std::string folder;                                  ///< of its results.
   bool reused = false;                                 ///< was there already.
   std::string failure;                                 ///< why it has no results; empty where it has.
+  std::string verdict;                                 ///< on its skin, as report.json has it; may be empty.
+  std::string fault;                                   ///< the line about it; empty where the skin is fine.
   double setup = 0.0;                                  ///< from the file to the first frame [s].
   double per_frame = 0.0;                              ///< stepping and writing [s].
   std::vector<std::pair<std::string, double>> phases;  ///< as report.json has them [s].

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 struct LadderRequest {
   std::string input, output;
   std::string rungs, levels = "1,2", steps = "1/120,1/240", frames, cells, converged = "0.5%", tolerance;
-  bool json = false;
+  bool json = false, strict = false;
 };
 
 std::vector<std::string> split(const std::string& list) {
@@ -81,6 +81,7 @@ Scene scene_of(const LadderRequest& request) {
   }
   if (!request.frames.empty()) set_from_text(scene, *find_scene_field("frames"), request.frames, "--frames");
   if (!request.cells.empty()) set_from_text(scene, *find_scene_field("cells"), request.cells, "--cells");
+  if (request.strict) scene.strict = true;
   scene.validate();
   if (scene.rig.empty() && !scene.plain)
     throw assets::ConfigError(request.input + ": rig is missing; hint: rig = \"character.glb\"");
@@ -153,6 +154,7 @@ int run_ladder_command(const LadderRequest& request) {
                      assets::Overwrite::Replace);
   std::cout << (request.json ? json : ladder_table(ladder));
   std::cerr << reference_text(ladder) << "\nlook at " << out("ladder.html") << '\n';
+  if (const std::string fault = fault_text(ladder); !fault.empty()) std::cerr << fault << '\n';
   return tolerance ? choose(scene, ladder, *tolerance, request.output) : exit_code::kDone;
 }
 
@@ -185,6 +187,8 @@ void add_ladder_command(CLI::App& app, CommandContext& context) {
       ->add_option("--tolerance", request->tolerance,
                    "print the cheapest run whose largest error is within it, and write it as a scene")
       ->type_name("2mm|1%");
+  command->add_flag("--strict", request->strict,
+                    "a run whose skin is torn or that did not settle has failed");
   command->add_flag("--json", request->json, "print ladder.json instead of a table");
   command->footer(
       "The reference is the finest run that worked: highest rung, then level, then shortest step. Runs that "

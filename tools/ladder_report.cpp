@@ -12,6 +12,7 @@
 #include "assets/result.h"
 #include "fem/models/model.h"
 #include "tools/detail/plot_axes.h"
+#include "tools/run_report.h"
 #include "tools/tolerance.h"
 
 namespace sinew::tools {
@@ -162,7 +163,8 @@ Figure phases_figure(const Ladder& ladder) {
     double total = 0.0;
     for (const auto& [phase, seconds] : run.phases) {
       total += seconds;
-      if (std::find(phases.begin(), phases.end(), phase) == phases.end() && phase != "preview")
+      if (std::find(phases.begin(), phases.end(), phase) == phases.end() && phase != "preview" &&
+          phase != kJudging)
         phases.push_back(phase);
     }
     longest = std::max(longest, total);
@@ -258,18 +260,31 @@ std::string reference_text(const Ladder& ladder) {
                      100.0 * ladder.limit);
 }
 
+std::string fault_text(const Ladder& ladder) {
+  const LadderRun* shown = &ladder.runs[static_cast<std::size_t>(ladder.reference)];
+  std::size_t torn = 0;
+  for (const LadderRun& run : ladder.runs) {
+    if (run.verdict != "torn") continue;
+    if (torn++ == 0 && shown->verdict != "torn") shown = &run;
+  }
+  if (shown->fault.empty()) return "";
+  if (torn == 0) return "note: " + shown->fault;
+  return fmt::format("warning: {} of {} runs tear the skin; {}: {}", torn, ladder.runs.size(), shown->name(),
+                     shown->fault);
+}
+
 std::string ladder_table(const Ladder& ladder) {
-  std::string text = fmt::format("{:<44} {:>10} {:>9} {:>11} {:>9} {:>11} {:>9}\n", "run", "ms/frame",
-                                 "setup s", "rms", "% height", "largest", "% height");
+  std::string text = fmt::format("{:<44} {:>10} {:>9} {:>11} {:>9} {:>11} {:>9} {:>6}\n", "run", "ms/frame",
+                                 "setup s", "rms", "% height", "largest", "% height", "skin");
   for (const LadderRun& run : ladder.runs) {
     if (!run.ok()) {
       text += fmt::format("{:<44} failed: {}\n", run.name(), run.failure);
       continue;
     }
-    text += fmt::format("{:<44} {:>10.3g} {:>9.3g} {:>11} {:>9.3g} {:>11} {:>9.3g}{}\n", run.name(),
+    text += fmt::format("{:<44} {:>10.3g} {:>9.3g} {:>11} {:>9.3g} {:>11} {:>9.3g} {:>6}{}\n", run.name(),
                         1e3 * run.per_frame, run.setup, length_text(run.error.rms),
                         percent_of_height(ladder, run.error.rms), length_text(run.error.largest),
-                        percent_of_height(ladder, run.error.largest), run.on_front ? " *" : "");
+                        percent_of_height(ladder, run.error.largest), run.verdict, run.on_front ? " *" : "");
   }
   return text + "* nothing is cheaper and as exact\n";
 }
@@ -297,6 +312,7 @@ std::string ladder_json(const Ladder& ladder, const std::string& settings) {
     json["worst_vertex"] = run.error.vertex;
     json["worst_frame"] = run.error.frame;
     json["on_front"] = run.on_front;
+    if (!run.verdict.empty()) json["skin"] = run.verdict;
     json["error_over_time"] = over_time;
     runs.push_back(json);
   }
@@ -334,21 +350,22 @@ std::string ladder_html(const Ladder& ladder, const std::string& title, const st
   html +=
       "<h2>All runs</h2>\n<table><tr><th>run</th><th>ms per frame</th><th>setup "
       "s</th><th>steps</th><th>rms</th>"
-      "<th>% of height</th><th>largest</th><th>% of height</th><th>at vertex</th><th>in frame</th></tr>\n";
+      "<th>% of height</th><th>largest</th><th>% of height</th><th>at vertex</th><th>in "
+      "frame</th><th>skin</th></tr>\n";
   for (const LadderRun& run : ladder.runs) {
     if (!run.ok()) {
-      html += fmt::format("<tr><td>{}</td><td colspan=\"9\">failed: {}</td></tr>\n", html_escaped(run.name()),
-                          html_escaped(run.failure));
+      html += fmt::format("<tr><td>{}</td><td colspan=\"10\">failed: {}</td></tr>\n",
+                          html_escaped(run.name()), html_escaped(run.failure));
       continue;
     }
     html += fmt::format(
         "<tr{}><td>{}</td><td>{:.3g}</td><td>{:.3g}</td><td>{}</td><td>{}</td><td>{:.3g}</td><td>{}</"
         "td><td>{:.3g}</td>"
-        "<td>{}</td><td>{}</td></tr>\n",
+        "<td>{}</td><td>{}</td><td>{}</td></tr>\n",
         run.on_front ? " class=\"front\"" : "", html_escaped(run.name()), 1e3 * run.per_frame, run.setup,
         run.steps, length_text(run.error.rms), percent_of_height(ladder, run.error.rms),
         length_text(run.error.largest), percent_of_height(ladder, run.error.largest), run.error.vertex,
-        run.error.frame);
+        run.error.frame, run.verdict);
   }
   html += "</table>\n<p>Shaded: nothing is cheaper and as exact.</p>\n";
   html += "<h2>Every rung (above) and the reference (below), where they are farthest apart</h2>\n";

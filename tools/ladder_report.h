@@ -28,6 +28,10 @@ std::vector<LadderThumbnail> ladder_thumbnails(const Ladder& ladder);
 /// What the reference is and whether the grid shows that it has converged; one or two sentences.
 std::string reference_text(const Ladder& ladder);
 
+/// One line where a run tears the skin or the reference is rough: how many do, and the fault of the reference
+/// or else of the first of them. Empty where all is well.
+std::string fault_text(const Ladder& ladder);
+
 /// One row per run, for the terminal.
 std::string ladder_table(const Ladder& ladder);
 /// Everything, for programs. `settings` is the scene in force.

@@ -15,6 +15,7 @@
 #include "assets/rig.h"
 #include "lattice/build.h"
 #include "lattice/quality.h"
+#include "tools/rig_files.h"
 
 namespace {
 
@@ -31,28 +32,6 @@ struct Row {
   int retries = 0;
   std::vector<lattice::GateFailure> failures;
 };
-
-bool is_rig(const fs::path& path) {
-  static const std::vector<std::string> kEndings{".glb", ".gltf", ".fbx", ".dae"};
-  return std::find(kEndings.begin(), kEndings.end(), path.extension().string()) != kEndings.end();
-}
-
-/// The rigs among files and folders, by name.
-std::vector<fs::path> find_rigs(const std::vector<std::string>& places) {
-  std::vector<fs::path> rigs;
-  for (const std::string& place : places) {
-    if (!fs::is_directory(place)) {
-      rigs.emplace_back(place);
-      continue;
-    }
-    std::vector<fs::path> here;
-    for (const fs::directory_entry& entry : fs::directory_iterator(place))
-      if (is_rig(entry.path())) here.push_back(entry.path());
-    std::sort(here.begin(), here.end());
-    rigs.insert(rigs.end(), here.begin(), here.end());
-  }
-  return rigs;
-}
 
 Row measure(const std::string& name, const assets::LatticeInput& input, int cells) {
   lattice::BuildOptions options;
@@ -127,7 +106,7 @@ int run(int argc, char** argv) {
       "| rig | wanted | cells | vertices | dihedral | Jacobian, cells | level-1 hexahedra | volume "
       "ratio | exact chains | skin inside | s | retries "
       "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-  for (const fs::path& rig : find_rigs(places)) {
+  for (const fs::path& rig : tools::find_rigs(places)) {
     const assets::LatticeInput input = assets::lattice_input(assets::load_rig(rig.string()));
     for (int cells : sizes) {
       rows.push_back(measure(rig.filename().string(), input, cells));

@@ -19,12 +19,14 @@
 #include "fem/equilibrium.h"
 #include "tools/character.h"
 #include "tools/command.h"
+#include "tools/detail/skin_json.h"
 #include "tools/failure.h"
 #include "tools/interrupt.h"
 #include "tools/plain_loads.h"
 #include "tools/progress.h"
 #include "tools/scene_fields.h"
 #include "tools/simulate_options.h"
+#include "tools/skin_report.h"
 
 namespace sinew::tools {
 namespace {
@@ -106,14 +108,18 @@ std::string pose_vtu(const fem::Body& body, const Points& x, const std::vector<f
   return assets::format_vtu(grid);
 }
 
-std::string skin_obj(const Scene& scene, const Character& c, const fem::Body& body, const Points& x,
-                     const std::vector<Eigen::Affine3d>& pose) {
+/// The whole skin: the flesh where it is, everything else as `skinned` has it.
+Points whole_skin(const Character& c, const fem::Body& body, const Points& x, const Points& skinned) {
   const Points surface = body.skin.weights * x;
-  Points all = assets::skin(c.rig, pose);
+  Points all = skinned;
   const std::vector<int>& map = c.input.skin.surface_of_vertex;
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (map[i] >= 0) all.row(static_cast<Eigen::Index>(i)) = surface.row(map[i]);
   }
+  return all;
+}
+
+std::string skin_obj(const Scene& scene, const Character& c, Points all) {
   if (scene.output_space == OutputSpace::File) {
     const Eigen::Affine3d file_from_rig = c.rig.rig_from_file.inverse();
     for (Eigen::Index i = 0; i < all.rows(); ++i)
@@ -128,8 +134,26 @@ std::string skin_obj(const Scene& scene, const Character& c, const fem::Body& bo
   return assets::obj_text(parts);
 }
 
-std::string pose_json(const Scene& scene, double time, const fem::Body& body, const fem::Equilibrium& found,
-                      const std::vector<fem::CellReport>& cells) {
+/// The skin of a pose against plain skinning.
+struct PosedSkin {
+  fem::SkinFrame measures;
+  SkinFinding finding;
+};
+
+std::optional<PosedSkin> judge_skin(const Scene& scene, const Character& c, const fem::Body& body,
+                                    const Points& flesh, const Points& skinned, double time) {
+  if (scene.plain) return std::nullopt;
+  auto judge = make_skin_judge(c, {time});
+  if (!judge) return std::nullopt;
+  PosedSkin skin;
+  skin.measures = judge->measure(flesh, skinned, fem::FrameKind::First);
+  skin.finding = find_fault(scene, c, body, skin.measures, time);
+  return skin;
+}
+
+std::string pose_json(const Scene& scene, double time, const assets::Rig& rig, const fem::Body& body,
+                      const fem::Equilibrium& found, const std::vector<fem::CellReport>& cells,
+                      const std::optional<PosedSkin>& skin) {
   Eigen::Index farthest = 0;
   const double moved = (found.x - body.mesh.points).rowwise().norm().maxCoeff(&farthest);
   double energy = 0.0;
@@ -138,20 +162,25 @@ std::string pose_json(const Scene& scene, double time, const fem::Body& body, co
     energy += cells[c].energy;
     if (cells[c].von_mises > cells[worst].von_mises) worst = c;
   }
-  const Json json{{"sinew", SINEW_VERSION},
-                  {"model", scene.model},
-                  {"time_s", time},
-                  {"load_factor", found.load_factor},
-                  {"load_steps", found.load_steps},
-                  {"iterations", found.report.iterations},
-                  {"residual", found.report.residual},
-                  {"leaf_cells", cells.size()},
-                  {"largest_displacement_m", moved},
-                  {"largest_displacement_vertex", farthest},
-                  {"elastic_J", energy},
-                  {"largest_von_mises_Pa", cells[worst].von_mises},
-                  {"largest_von_mises_cell", worst},
-                  {"settings_toml", print_scene(scene)}};
+  Json json{{"sinew", SINEW_VERSION},
+            {"model", scene.model},
+            {"time_s", time},
+            {"load_factor", found.load_factor},
+            {"load_steps", found.load_steps},
+            {"iterations", found.report.iterations},
+            {"residual", found.report.residual},
+            {"leaf_cells", cells.size()},
+            {"largest_displacement_m", moved},
+            {"largest_displacement_vertex", farthest},
+            {"elastic_J", energy},
+            {"largest_von_mises_Pa", cells[worst].von_mises},
+            {"largest_von_mises_cell", worst},
+            {"settings_toml", print_scene(scene)}};
+  if (skin) {
+    json["skin"] = detail::skin_json(skin->measures, rig);
+    json["skin"]["verdict"] = fem::name(skin->finding.verdict);
+    json["skin"]["line"] = skin->finding.line;
+  }
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -213,15 +242,20 @@ void find_pose(const PoseRequest& request) {
     throw NumericalError(fmt::format("{}: {}", character.rig.file, found.report.message));
   const std::unique_ptr<fem::Model> model = fem::find_model(scene.model)->make(body, options.solver);
   const std::vector<fem::CellReport> cells = fem::report_cells(body, *model, found.x, found.pose);
-  const std::string json = pose_json(scene, time, body, found, cells);
+  const Points skinned = assets::skin(character.rig, found.pose.joints);
+  const Points flesh = whole_skin(character, body, found.x, skinned);
+  const std::optional<PosedSkin> skin = judge_skin(scene, character, body, flesh, skinned, time);
+  if (skin && scene.strict) refuse_torn(skin->finding);
+  const std::string json = pose_json(scene, time, character.rig, body, found, cells, skin);
   out.write("pose.vtu", pose_vtu(body, found.x, cells));
-  out.write("skin.obj", skin_obj(scene, character, body, found.x, found.pose.joints));
+  out.write("skin.obj", skin_obj(scene, character, flesh));
   out.write("pose.json", json);
   stop_if_interrupted("before the results were in place");
   out.commit();
   if (scene.json) std::cout << json;
   talk(fmt::format("{} in {} load steps; wrote {}/pose.vtu, {}/skin.obj and {}/pose.json", scene.model,
                    found.load_steps, scene.output, scene.output, scene.output));
+  if (skin) tell(skin->finding, talk);
 }
 
 }  // namespace
@@ -241,9 +275,10 @@ void add_pose_command(CLI::App& app, CommandContext& context) {
   command->footer(
       "Writes pose.vtu (the lattice's cells at rest, with displacement, Green strain, Cauchy and von Mises "
       "stress and\n"
-      "energy), skin.obj (the posed skin) and pose.json. Exit code 4: no equilibrium was found; the message "
-      "says at\n"
-      "which part of the load, and where.");
+      "energy), skin.obj (the posed skin) and pose.json. Exit code 4: no equilibrium was found (the message "
+      "says "
+      "at\n"
+      "which part of the load, and where), or with --strict the skin is torn.");
   command->callback([request, &context] {
     find_pose(*request);
     context.exit_code = 0;

@@ -3,16 +3,18 @@
 #include <algorithm>
 #include <limits>
 
-#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
+
+#include "tools/detail/skin_json.h"
 
 namespace sinew::tools {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json frame_json(const FrameReport& f, int active) {
+Json frame_json(const FrameReport& f, int active, const assets::Rig& rig) {
   const fem::Measures& m = f.measures;
+<<<<<<< HEAD
   return {{"frame", f.frame},
           {"time_s", f.time},
           {"steps", f.steps},
@@ -30,6 +32,34 @@ Json frame_json(const FrameReport& f, int active) {
           {"mended_area", f.mended.area},
           {"largest_mended_m", f.mended.largest},
           {"flipped_triangles", f.flipped_triangles}};
+=======
+  Json json{{"frame", f.frame},
+            {"time_s", f.time},
+            {"steps", f.steps},
+            {"active_functions", active},
+            {"kinetic_J", m.kinetic},
+            {"elastic_J", m.elastic},
+            {"potential_J", m.potential},
+            {"ties_J", m.ties},
+            {"largest_speed_m_per_s", m.largest_speed},
+            {"bone_residual_m", m.bone_residual},
+            {"largest_strain", m.largest_strain},
+            {"min_det_j", m.min_det},
+            {"inverted_cells", m.inverted_cells}};
+  if (f.skin) {
+    json["flipped_triangles"] = f.skin->flipped;
+    json["skin"] = detail::skin_json(*f.skin, rig);
+  }
+  return json;
+}
+
+Json finding_json(const SkinFinding& finding) {
+  return {{"verdict", fem::name(finding.verdict)},
+          {"worst_frame", finding.frame},
+          {"worst_place", finding.place},
+          {"torn_frames", finding.torn_frames},
+          {"line", finding.line}};
+>>>>>>> f8f8782 (WIP tools)
 }
 
 Json lattice_json(const lattice::ControlLattice& lattice) {
@@ -52,30 +82,6 @@ Json lattice_json(const lattice::ControlLattice& lattice) {
 }
 
 }  // namespace
-
-int count_flipped_triangles(const fem::Body& body, const lattice::Surface& surface,
-                            const lattice::Points& positions,
-                            const std::vector<Eigen::Affine3d>& pose_from_rest) {
-  const fem::PosedFrames posed = fem::pose_frames(body.tree, pose_from_rest, 0.0);
-  int flipped = 0;
-  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
-    const Eigen::RowVector3i v = surface.triangles.row(t);
-    const auto normal = [&](const lattice::Points& p) -> Eigen::Vector3d {
-      const Eigen::Vector3d a = p.row(v[0]).transpose(), b = p.row(v[1]).transpose(),
-                            c = p.row(v[2]).transpose();
-      return (b - a).cross(c - a);
-    };
-    Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
-    for (int k = 0; k < 3; ++k) {
-      for (const auto& influence : surface.weights[static_cast<std::size_t>(v[k])]) {
-        const int f = body.tree.frame_of_joint[static_cast<std::size_t>(influence.frame)];
-        if (f >= 0) rotation += influence.weight * posed.frames[static_cast<std::size_t>(f)].rotation;
-      }
-    }
-    if (normal(positions).dot(rotation * normal(surface.points)) < 0.0) ++flipped;
-  }
-  return flipped;
-}
 
 std::string report_json(const RunReport& report, const Character& character, const fem::Body& body) {
   Json json;
@@ -122,14 +128,17 @@ std::string report_json(const RunReport& report, const Character& character, con
     strain = std::max(strain, f.measures.largest_strain);
     det = std::min(det, f.measures.min_det);
     inverted = std::max(inverted, f.measures.inverted_cells);
-    flipped = std::max(flipped, f.flipped_triangles);
-    frames.push_back(frame_json(f, report.counts.functions));
+    if (f.skin) flipped = std::max(flipped, f.skin->flipped);
+    frames.push_back(frame_json(f, report.counts.functions, character.rig));
   }
   json["worst"] = {{"bone_residual_m", residual},
                    {"largest_strain", strain},
                    {"min_det_j", det},
-                   {"inverted_cells", inverted},
-                   {"flipped_triangles", flipped}};
+                   {"inverted_cells", inverted}};
+  if (report.finding) {
+    json["worst"]["flipped_triangles"] = flipped;
+    json["skin"] = finding_json(*report.finding);
+  }
   json["frames"] = frames;
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -7,6 +8,7 @@
 #include "fem/simulation.h"
 #include "fem/skin_guard.h"
 #include "tools/character.h"
+#include "tools/skin_report.h"
 
 /// report.json: what a run did and what it found.
 namespace sinew::tools {
@@ -17,9 +19,16 @@ struct FrameReport {
   double time = 0.0;  ///< of the clip [s].
   int steps = 0;      ///< taken since the frame before.
   fem::Measures measures;
+<<<<<<< HEAD
   fem::Mended mended;         ///< of the skin; lengths [m].
   int flipped_triangles = 0;  ///< skin triangles that face against their bones' rotation.
+=======
+  std::optional<fem::SkinFrame> skin;  ///< empty for a plain scene, which nobody skins.
+>>>>>>> f8f8782 (WIP tools)
 };
+
+/// The phase of judging the skin, which is no part of making it.
+inline constexpr const char* kJudging = "judge the skin";
 
 struct RunReport {
   std::string version;
@@ -33,13 +42,9 @@ struct RunReport {
   fem::EnergyCap::Taken energy_taken;
   std::vector<fem::Cut> cuts;  ///< of the clip.
   std::vector<FrameReport> frames;
+  double judging = 0.0;                ///< all frames [s].
+  std::optional<SkinFinding> finding;  ///< on the skin of all frames; empty as theirs.
 };
-
-/// Triangles of the simulated surface whose posed normal points against their rest normal turned by the
-/// blended rotation of their vertices' frames. positions: of surface.points.
-int count_flipped_triangles(const fem::Body& body, const lattice::Surface& surface,
-                            const lattice::Points& positions,
-                            const std::vector<Eigen::Affine3d>& pose_from_rest);
 
 /// The report as JSON text, ending in a newline; numbers are locale-independent and round-trip.
 std::string report_json(const RunReport& report, const Character& character, const fem::Body& body);

@@ -157,6 +157,8 @@ struct Scene {
   Switch guard = Switch::On;
   /// The contact sheet of frames.
   Switch preview = Switch::On;
+  /// Refuse flesh that an eye would call torn, or that did not settle: exit code 4, nothing is written.
+  bool strict = false;
   /// Threads; 0 ... 1024, 0 = all. The results do not depend on it.
   int threads = 0;
   /// The artist's own mesh (OBJ or PLY), whose vertex order the output takes over; empty: the rig's order.

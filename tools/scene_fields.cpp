@@ -126,6 +126,8 @@ constexpr auto kFields = std::to_array<SceneField>({
     {"guard", &Scene::guard,
      "on or off: lay skin back towards plain skinning where it would tear or crease as cells are too coarse"},
     {"preview", &Scene::preview, "on or off: the picture of eight frames"},
+    {"strict", &Scene::strict,
+     "refuse flesh that is torn or did not settle: exit code 4, nothing is written"},
     {"threads",
      &Scene::threads,
      "threads, 0 = all; the results do not depend on it",

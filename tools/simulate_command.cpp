@@ -36,6 +36,8 @@
 #include "tools/run_report.h"
 #include "tools/scene_fields.h"
 #include "tools/simulate_options.h"
+#include "tools/skin_report.h"
+#include "tools/whole_skin.h"
 
 namespace sinew::tools {
 namespace {
@@ -65,16 +67,6 @@ struct OutputLayout {
   }
 };
 
-Points rest_points(const assets::Rig& rig) {
-  Points all(assets::num_vertices(rig), 3);
-  Eigen::Index next = 0;
-  for (const assets::Part& part : rig.parts) {
-    all.middleRows(next, part.points.rows()) = part.points;
-    next += part.points.rows();
-  }
-  return all;
-}
-
 OutputLayout make_layout(const Scene& scene, const Character& character) {
   const assets::Rig& rig = character.rig;
   OutputLayout layout;
@@ -98,21 +90,6 @@ OutputLayout make_layout(const Scene& scene, const Character& character) {
     next += part.points.rows();
   }
   return layout;
-}
-
-/// Triangles of all parts over all rig vertices.
-lattice::Triangles all_triangles(const assets::Rig& rig) {
-  Eigen::Index count = 0;
-  for (const auto& part : rig.parts) count += part.triangles.rows();
-  lattice::Triangles all(count, 3);
-  Eigen::Index next = 0;
-  int offset = 0;
-  for (const auto& part : rig.parts) {
-    all.middleRows(next, part.triangles.rows()) = part.triangles.array() + offset;
-    next += part.triangles.rows();
-    offset += static_cast<int>(part.points.rows());
-  }
-  return all;
 }
 
 /// One frame of the whole character in the rig's space: the flesh from the simulation, everything else
@@ -209,6 +186,18 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Flesh that still moves when its time to settle is over brings that motion into the first frames.
+void check_settled(const Scene& scene, const Character& character, const fem::SimulationReport& settled,
+                   const Talk& talk) {
+  if (settled.steps == 0 || settled.speed < simulation_options(scene).settle_speed) return;
+  const std::string line = fmt::format(
+      "{}: the flesh did not settle in {:g} s: it still moves at {:.3g} m/s; hint: --settle {:g}, or stiffer "
+      "flesh by --young",
+      character.rig.file, scene.settle, settled.speed, std::max(10.0, 4.0 * scene.settle));
+  if (scene.strict) throw NumericalError(line);
+  talk("warning: " + line);
+}
+
 /// The files that stand beside the cache.
 void write_companions(const Scene& scene, const Character& character, const OutputLayout& layout,
                       const RunReport& report, const fem::Body& body, const FrameRange& frames,
@@ -238,6 +227,7 @@ void write_companions(const Scene& scene, const Character& character, const Outp
   out.write("report.json", report_json(report, character, body));
 }
 
+<<<<<<< HEAD
 /// Mends the flesh of a frame against its plain skinning.
 class FrameGuard {
  public:
@@ -293,6 +283,46 @@ void say_what_was_mended(const Character& character, const std::vector<FrameRepo
                   ->mended.area,
       100.0 * most->mended.largest / character.rig.height, most->frame,
       joint < 0 ? std::string("the body") : character.input.joints.names[static_cast<std::size_t>(joint)]));
+=======
+/// The judge of a run's frames, and the time it takes.
+class Judge {
+ public:
+  Judge(const Scene& scene, const Character& character, const FrameRange& frames) {
+    if (scene.plain) return;
+    std::vector<double> times;
+    for (int number = frames.first; number <= frames.last; ++number)
+      times.push_back(character.the_clip().start + number / scene.fps);
+    const auto start = std::chrono::steady_clock::now();
+    judge_ = make_skin_judge(character, times);
+    seconds_ += seconds_since(start);
+  }
+
+  std::optional<fem::SkinFrame> measure(const CharacterFrame& frame, fem::FrameKind kind) {
+    if (!judge_) return std::nullopt;
+    const auto start = std::chrono::steady_clock::now();
+    const fem::SkinFrame skin = judge_->measure(frame.simulated, frame.skinned, kind);
+    seconds_ += seconds_since(start);
+    return skin;
+  }
+
+  double seconds() const { return seconds_; }
+
+ private:
+  std::optional<fem::SkinJudge> judge_;
+  double seconds_ = 0.0;
+};
+
+/// The verdict on the frames of the report.
+void find_fault(const Scene& scene, const Character& character, const fem::Body& body, RunReport& report) {
+  std::vector<fem::SkinFrame> skins;
+  std::vector<int> numbers;
+  for (const FrameReport& frame : report.frames) {
+    if (!frame.skin) return;
+    skins.push_back(*frame.skin);
+    numbers.push_back(frame.frame);
+  }
+  report.finding = find_fault(scene, character, body, skins, numbers);
+>>>>>>> f8f8782 (WIP tools)
 }
 
 /// Steps through the frames, writes the cache and keeps what the preview shows.
@@ -304,6 +334,7 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
   const int count = frames.last - frames.first + 1;
   const std::vector<int> shown = assets::preview_frames(count);
   std::vector<assets::PreviewFrame> preview;
+  Judge judge(scene, character, frames);
   assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
   const FrameGuard guard(scene, character);
   Progress progress("simulating", count);
@@ -328,8 +359,12 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
     f.time = time;
     f.steps = step.steps;
     f.measures = simulation.measures_at(time);
+<<<<<<< HEAD
     f.mended = mended;
     f.flipped_triangles = count_flipped_triangles(body, character.input.skin.surface, surface, pose);
+=======
+    f.skin = judge.measure(frame, k == 0 ? fem::FrameKind::First : fem::FrameKind::Later);
+>>>>>>> f8f8782 (WIP tools)
     report.frames.push_back(f);
     if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
       preview.push_back(
@@ -338,6 +373,7 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
     progress.update(k + 1);
   }
   writer.finish();
+  report.judging = judge.seconds();
   return preview;
 }
 
@@ -395,6 +431,7 @@ void simulate(const Scene& scene, const Talk& talk) {
     simulation.set_velocity(starting_velocity(*scene.plain, simulation.state().x));
   report.settle_steps = settled.steps;
   report.settle_speed = settled.speed;
+<<<<<<< HEAD
   report.settle_joint = settled.fastest;
   report.settled = settled.settled;
   say_settling(scene, settled, body, talk);
@@ -402,6 +439,18 @@ void simulate(const Scene& scene, const Talk& talk) {
       run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
   lap("simulate and write frames");
   say_what_was_mended(character, report.frames, talk);
+=======
+  check_settled(scene, character, settled, talk);
+  talk(
+      fmt::format("settled in {} steps; fastest flesh left {:.2g} mm/s", settled.steps, 1e3 * settled.speed));
+  const auto preview =
+      run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
+  lap("simulate and write frames");
+  report.times.back().second -= report.judging;
+  report.times.emplace_back(kJudging, report.judging);
+  find_fault(scene, character, body, report);
+  if (report.finding && scene.strict) refuse_torn(*report.finding);
+>>>>>>> f8f8782 (WIP tools)
   if (scene.preview == Switch::On) write_picture(character, preview, out.file(kPicture));
   lap("preview");
   report.counts = simulation.counts();
@@ -422,6 +471,7 @@ void simulate(const Scene& scene, const Talk& talk) {
     if (name != kPicture || scene.preview == Switch::On) talk("  " + scene.output + "/" + name);
   }
   if (scene.preview == Switch::On) talk("look at " + scene.output + "/" + kPicture);
+  if (report.finding) tell(*report.finding, talk);
 }
 
 void add_simulate_command(CLI::App& app, CommandContext& context) {

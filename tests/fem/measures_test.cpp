@@ -1,5 +1,8 @@
 #include "fem/measures.h"
 
+#include <algorithm>
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "tests/fem/arm.h"
@@ -86,10 +89,20 @@ TEST(Measures, OfAConstantStretchAreThoseOfTheClosedForm) {
   EXPECT_NEAR(m.bone_residual, 0.02, 1e-12);
 }
 
+/// The first cell that is full of flesh.
+std::size_t full_cell(const Body& body) {
+  const auto found = std::find_if(body.fill.begin(), body.fill.end(), [](const auto& fill) {
+    return *std::min_element(fill.begin(), fill.end()) > 0.99;
+  });
+  return static_cast<std::size_t>(found - body.fill.begin());
+}
+
 TEST(Measures, CountInvertedCellsAndNameTheWorst) {
   const Body body = tests::arm_body(tests::make_arm(), 2.0);
   Points x = body.mesh.points;
-  const lattice::HexVertices& cell = body.mesh.cells[7];
+  const std::size_t full = full_cell(body);
+  ASSERT_LT(full, body.mesh.cells.size());
+  const lattice::HexVertices& cell = body.mesh.cells[full];
   x.row(cell[0]) += 1.5 * (x.row(cell[6]) - x.row(cell[0]));  // a corner pushed through its opposite
   const PosedFrames posed = pose_frames(body.tree, tests::arm_pose(0.0), 0.0);
   const Measures m = measure(body, x, Points::Zero(x.rows(), 3), posed, Eigen::Vector3d::Zero());
@@ -97,6 +110,31 @@ TEST(Measures, CountInvertedCellsAndNameTheWorst) {
   EXPECT_GE(m.inverted_cells, 1);
   const auto& worst = body.mesh.cells[static_cast<std::size_t>(m.min_det_cell)];
   EXPECT_NE(std::find(worst.begin(), worst.end(), cell[0]), worst.end());
+}
+
+// The same cell in flesh that fills less than half of it is as inverted as before, but nobody could see it.
+TEST(Measures, DoNotCountCellsThatHoldHardlyAnyFlesh) {
+  Body body = tests::arm_body(tests::make_arm(), 2.0);
+  Points x = body.mesh.points;
+  const lattice::HexVertices& cell = body.mesh.cells[7];
+  x.row(cell[0]) += 1.5 * (x.row(cell[6]) - x.row(cell[0]));
+  for (std::size_t c = 0; c < body.mesh.cells.size(); ++c) {
+    const lattice::HexVertices& v = body.mesh.cells[c];
+    if (std::find(v.begin(), v.end(), cell[0]) != v.end()) body.fill[c].fill(0.49);
+  }
+  const PosedFrames posed = pose_frames(body.tree, tests::arm_pose(0.0), 0.0);
+  const auto measures = [&] {
+    return measure(body, x, Points::Zero(x.rows(), 3), posed, Eigen::Vector3d::Zero());
+  };
+  EXPECT_EQ(measures().inverted_cells, 0);
+  EXPECT_NEAR(measures().min_det, 1.0, 1e-12);  // all that is left stands at rest
+  EXPECT_NEAR(measures().largest_strain, 0.0, 1e-12);
+  body.fill[7].fill(0.5);
+  EXPECT_EQ(measures().inverted_cells, 1);
+  EXPECT_EQ(measures().min_det_cell, 7);
+  for (lattice::FillFractions& fill : body.fill) fill.fill(0.1);
+  EXPECT_EQ(measures().min_det, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(measures().min_det_cell, -1);
 }
 
 }  // namespace

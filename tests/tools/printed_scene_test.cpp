@@ -30,6 +30,7 @@ Scene random_scene(std::mt19937_64& rng) {
   scene.rig = text();
   scene.output = text();
   scene.overwrite = index(2) == 1;
+  scene.strict = index(2) == 1;
   scene.json = index(2) == 1;
   if (index(2) == 1) scene.clip = text();
   if (index(2) == 1) scene.lattice = text();

@@ -97,6 +97,7 @@ rig = "hero.glb"
 output = "out/hero"
 overwrite = true
 json = true
+strict = true
 clip = "walk"
 cells = 500
 tip_bones = "off"
@@ -145,6 +146,7 @@ region = "trunk"
   expected.output = "out/hero";
   expected.overwrite = true;
   expected.json = true;
+  expected.strict = true;
   expected.clip = "walk";
   expected.cells = 500;
   expected.tip_bones = expected.symmetry = expected.preview = Switch::Off;

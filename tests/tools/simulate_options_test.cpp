@@ -107,6 +107,7 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
                              "--output-mesh",
                              "a.obj",
                              "--overwrite",
+                             "--strict",
                              "--json"});
   EXPECT_EQ(scene.clip, "walk");
   EXPECT_EQ(scene.lattice, "a.vtu");
@@ -131,6 +132,7 @@ TEST(SimulateOptions, SetWhatTheFlagsSay) {
   EXPECT_EQ(scene.threads, 3);
   EXPECT_EQ(scene.output_mesh, "a.obj");
   EXPECT_TRUE(scene.overwrite);
+  EXPECT_TRUE(scene.strict);
   EXPECT_TRUE(scene.json);
 }
 
