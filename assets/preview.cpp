@@ -149,12 +149,9 @@ void PreviewOptions::validate() const {
 
 lattice::Points role_colours(const Rig& rig) {
   lattice::Points colours = flesh(num_vertices(rig));
-  Eigen::Index first = 0;
-  for (const Part& part : rig.parts) {
-    if (part.role != PartRole::Simulated)
-      colours.middleRows(first, part.points.rows()).rowwise() = kFollower.transpose();
-    first += part.points.rows();
-  }
+  const std::vector<bool> is_flesh = flesh_vertices(rig.parts, rig.props);
+  for (std::size_t v = 0; v < is_flesh.size(); ++v)
+    if (!is_flesh[v]) colours.row(static_cast<Eigen::Index>(v)) = kFollower.transpose();
   return colours;
 }
 

@@ -104,6 +104,16 @@ int num_vertices(const Rig& rig) {
   return static_cast<int>(count);
 }
 
+std::vector<bool> flesh_vertices(const std::vector<Part>& parts, const std::vector<Prop>& props) {
+  std::vector<bool> is_flesh;
+  for (const Part& part : parts)
+    is_flesh.insert(is_flesh.end(), static_cast<std::size_t>(part.points.rows()),
+                    part.role == PartRole::Simulated);
+  for (const Prop& prop : props)
+    for (const int v : prop.vertices) is_flesh[static_cast<std::size_t>(v)] = false;
+  return is_flesh;
+}
+
 lattice::Points skin(const Rig& rig, const std::vector<Eigen::Affine3d>& pose_from_rest) {
   if (static_cast<int>(pose_from_rest.size()) != rig.skeleton.num_joints()) {
     throw std::invalid_argument("skin: " + std::to_string(pose_from_rest.size()) + " joint maps for " +
@@ -136,12 +146,12 @@ PhysicsSkin physics_skin(const Rig& rig) {
   // A rig of one point has no diagonal; any positive width will do for the grid.
   const double size = diagonal(rig);
   Welder welder(size > 0.0 ? 1e-6 * size : 1.0, points, result.surface.weights);
+  const std::vector<bool> is_flesh = flesh_vertices(rig.parts, rig.props);
   for (const Part& part : rig.parts) {
     const std::size_t first = result.surface_of_vertex.size();
     for (Eigen::Index v = 0; v < part.points.rows(); ++v) {
-      const bool simulated = part.role == PartRole::Simulated;
       result.surface_of_vertex.push_back(
-          simulated
+          is_flesh[result.surface_of_vertex.size()]
               ? welder.find_or_add(part.points.row(v).transpose(), part.weights[static_cast<std::size_t>(v)])
               : -1);
     }
@@ -157,6 +167,7 @@ PhysicsSkin physics_skin(const Rig& rig) {
         std::swap(corners[1], corners[2]);
         ++next_turned;
       }
+      if (corners[0] < 0) continue;  // of a prop, which has whole triangles
       if (corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0]) {
         triangles.push_back(corners);
       }

@@ -26,6 +26,7 @@ enum class PartRole {
   Simulated,  ///< skinned and made of flesh: embedded in the lattice.
   Skinned,    ///< skinned, but follows by plain skinning (not simulated).
   Rigid,      ///< follows one joint (or stands still when joint is -1).
+  Riding,     ///< skinned, and carried along by what moves the flesh round it.
 };
 
 /// One mesh of the file, in the file's own vertex order.
@@ -49,6 +50,22 @@ struct FaultyClip {
   int index = 0;       ///< its place among all clips of the file.
 };
 
+/// A vertex of the flesh with its share in what carries a prop.
+struct Anchor {
+  int vertex = 0;       ///< of the rig (part by part).
+  double weight = 0.0;  ///< [-]; > 0.
+};
+
+/// A piece of the character that keeps its shape: a weapon, a hat, an eye.
+struct Prop {
+  std::string name;                   ///< of its island (assets/islands.h).
+  PartRole role = PartRole::Skinned;  ///< Skinned, Rigid or Riding.
+  int joint = -1;                     ///< that it hangs on; -1 where there is not one alone.
+  std::vector<int> vertices;          ///< of the rig (part by part), ascending.
+  std::vector<Anchor> anchors;        ///< Riding: the flesh round it; weights sum to 1.
+  std::string reason;                 ///< of its role.
+};
+
 enum class UpAxis { X, Y, Z };
 
 /// A character as plain values: SI units, right-handed, Y up, skeleton rest = bind pose.
@@ -56,6 +73,8 @@ struct Rig {
   std::string file;    ///< as the user gave it.
   std::string format;  ///< "glTF 2.0", "FBX", "Collada", ...
   std::vector<Part> parts;
+  /// What keeps its shape, whatever the role of its part. Nothing before set_roles (assets/islands.h).
+  std::vector<Prop> props;
   skeleton::Skeleton skeleton;
   std::vector<skeleton::Clip> clips;
   std::vector<FaultyClip> faulty_clips;  ///< left out of `clips`.
@@ -74,14 +93,18 @@ struct Rig {
 /// Total vertex count over all parts: the order of every exported frame is part by part.
 int num_vertices(const Rig& rig);
 
+/// For every vertex of a rig with these parts and props: whether it is flesh, of a simulated part and of no
+/// prop.
+std::vector<bool> flesh_vertices(const std::vector<Part>& parts, const std::vector<Prop>& props);
+
 /// Linear blend skinning of every part with T_J = pose_from_rest, num_vertices(rig) x 3 [m]: the plain
 /// skinning that the simulation is compared with, and the motion of parts that are not simulated.
 lattice::Points skin(const Rig& rig, const std::vector<Eigen::Affine3d>& pose_from_rest);
 
-/// The simulated parts welded into one surface for physics.
+/// The flesh welded into one surface for physics.
 struct PhysicsSkin {
   lattice::Surface surface;  ///< welded: points closer than 1e-6 of the diagonal with equal weights are one.
-  /// For every rig vertex (part by part): index into surface.points, or -1 where the part is not simulated.
+  /// For every rig vertex (part by part): index into surface.points, or -1 where it is no flesh.
   std::vector<int> surface_of_vertex;
 };
 PhysicsSkin physics_skin(const Rig& rig);

@@ -20,6 +20,7 @@
 #include "tools/lattice_memory.h"
 #include "tools/plain_character.h"
 #include "tools/plain_loads.h"
+#include "tools/roles.h"
 #include "tools/suggest.h"
 
 namespace sinew::tools {
@@ -329,6 +330,7 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
     options.height = scene.height.value_or(0.0);
     c.rig = assets::load_rig(scene.rig, options);
     c.clip = assets::choose_clip(c.rig, scene.clip);
+    settle_roles(scene, c.rig, talk);
     c.input = assets::lattice_input(c.rig);
   }
   for (const assets::Finding& finding : c.rig.findings) {

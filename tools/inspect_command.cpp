@@ -12,11 +12,13 @@
 #include <nlohmann/json.hpp>
 
 #include "assets/error.h"
+#include "assets/islands.h"
 #include "assets/lattice_input.h"
 #include "lattice/build.h"
 #include "tools/command.h"
 #include "tools/exit_code.h"
 #include "tools/failure.h"
+#include "tools/roles.h"
 
 namespace sinew::tools {
 namespace {
@@ -32,6 +34,8 @@ const char* word(PartRole role) {
       return "simulated";
     case PartRole::Skinned:
       return "skinned";
+    case PartRole::Riding:
+      return "riding";
     default:
       return "rigid";
   }
@@ -66,6 +70,7 @@ void weigh_joints(Inspection& result) {
 }
 
 void find_bones(Inspection& result) {
+  assets::set_roles(result.rig, assets::find_islands(result.rig));
   const assets::LatticeInput input = assets::lattice_input(result.rig);
   lattice::BuildResult built;
   try {
@@ -144,6 +149,19 @@ ordered_json parts_json(const Inspection& inspection) {
   return list;
 }
 
+ordered_json props_json(const assets::Rig& rig) {
+  ordered_json list = ordered_json::array();
+  for (const assets::Prop& prop : rig.props) {
+    ordered_json item{{"name", prop.name},
+                      {"role", word(prop.role)},
+                      {"vertices", prop.vertices.size()},
+                      {"reason", prop.reason}};
+    item["joint"] = prop.joint < 0 ? ordered_json() : ordered_json(rig.skeleton.joint(prop.joint).name);
+    list.push_back(std::move(item));
+  }
+  return list;
+}
+
 ordered_json joints_json(const Inspection& inspection) {
   ordered_json list = ordered_json::array();
   for (std::size_t j = 0; j < inspection.joints.size(); ++j) {
@@ -206,6 +224,12 @@ std::string parts_text(const assets::Rig& rig) {
     text += fmt::format("  {:<{}}  {:<9}  {:>8}  {:>9}  {}\n", part.name, width, word(part.role),
                         part.points.rows(), part.triangles.rows(), follows);
   }
+  return text;
+}
+
+std::string props_text(const assets::Rig& rig) {
+  std::string text = "\nProps: pieces that keep their shape ([[part]] name, role in a scene changes it)\n";
+  for (const assets::Prop& prop : rig.props) text += "  " + prop_line(rig, prop) + "\n";
   return text;
 }
 
@@ -305,6 +329,7 @@ std::string inspection_text(const Inspection& inspection) {
               : fmt::format("  motion    {}; '{}' is taken\n", counted(rig.clips.size(), "clip"),
                             rig.clips[static_cast<std::size_t>(inspection.clip)].name);
   if (!rig.parts.empty()) text += parts_text(rig);
+  if (!rig.props.empty()) text += props_text(rig);
   if (!inspection.joints.empty()) {
     text += "\nJoints (share of the skin's weight, bones of the lattice)\n" + joint_tree(inspection);
   }
@@ -337,6 +362,7 @@ std::string inspection_json(const Inspection& inspection) {
                         {"vertex_order", rig.file_vertex_order ? "file" : "importer"},
                         {"vertices", assets::num_vertices(rig)}};
   document["parts"] = parts_json(inspection);
+  document["props"] = props_json(rig);
   document["joints"] = joints_json(inspection);
   document["bones"] = bones_json(inspection);
   document["skeleton_changes"] = std::move(changes);

@@ -24,6 +24,7 @@
 #include "tools/failure.h"
 #include "tools/interrupt.h"
 #include "tools/lattice_memory.h"
+#include "tools/roles.h"
 #include "tools/scene_flags.h"
 
 namespace sinew::tools {
@@ -273,6 +274,7 @@ void run_lattice(const LatticeRequest& request) {
   Character character;
   character.rig = assets::load_rig(scene.rig, load);
   character.clip = clip_of(scene, character.rig);
+  settle_roles(scene, character.rig, [](const std::string& line) { std::cerr << line << '\n'; });
   character.input = assets::lattice_input(character.rig);
   const lattice::JointTree& joints = character.input.joints;
   stop_if_interrupted("before building the lattice");

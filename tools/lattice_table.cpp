@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "assets/islands.h"
 #include "assets/lattice_input.h"
 #include "assets/rig.h"
 #include "lattice/build.h"
@@ -107,7 +108,9 @@ int run(int argc, char** argv) {
       "ratio | exact chains | skin inside | s | retries "
       "|\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const fs::path& rig : tools::find_rigs(places)) {
-    const assets::LatticeInput input = assets::lattice_input(assets::load_rig(rig.string()));
+    assets::Rig character = assets::load_rig(rig.string());
+    assets::set_roles(character, assets::find_islands(character));
+    const assets::LatticeInput input = assets::lattice_input(character);
     for (int cells : sizes) {
       rows.push_back(measure(rig.filename().string(), input, cells));
       print(rows.back());

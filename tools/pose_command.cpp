@@ -14,6 +14,7 @@
 #include "assets/atomic_output.h"
 #include "assets/error.h"
 #include "assets/obj.h"
+#include "assets/riding.h"
 #include "assets/vtu.h"
 #include "fem/cell_report.h"
 #include "fem/equilibrium.h"
@@ -21,6 +22,7 @@
 #include "tools/command.h"
 #include "tools/detail/skin_json.h"
 #include "tools/failure.h"
+#include "tools/frame_guard.h"
 #include "tools/interrupt.h"
 #include "tools/plain_loads.h"
 #include "tools/progress.h"
@@ -108,14 +110,17 @@ std::string pose_vtu(const fem::Body& body, const Points& x, const std::vector<f
   return assets::format_vtu(grid);
 }
 
-/// The whole skin: the flesh where it is, everything else as `skinned` has it.
-Points whole_skin(const Character& c, const fem::Body& body, const Points& x, const Points& skinned) {
-  const Points surface = body.skin.weights * x;
+/// The whole skin: the flesh where it is, mended, and props on it; everything else as `skinned` has it.
+Points whole_skin(const Scene& scene, const Character& c, const fem::Body& body, const Points& x,
+                  const std::vector<Eigen::Affine3d>& pose, const Points& skinned) {
+  const Points surface = body.skin_rows * x;
   Points all = skinned;
   const std::vector<int>& map = c.input.skin.surface_of_vertex;
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (map[i] >= 0) all.row(static_cast<Eigen::Index>(i)) = surface.row(map[i]);
   }
+  FrameGuard(scene, c).mend(skinned, all);
+  assets::PropMotion(c.rig).place(pose, skinned, all);
   return all;
 }
 
@@ -243,7 +248,7 @@ void find_pose(const PoseRequest& request) {
   const std::unique_ptr<fem::Model> model = fem::find_model(scene.model)->make(body, options.solver);
   const std::vector<fem::CellReport> cells = fem::report_cells(body, *model, found.x, found.pose);
   const Points skinned = assets::skin(character.rig, found.pose.joints);
-  const Points flesh = whole_skin(character, body, found.x, skinned);
+  const Points flesh = whole_skin(scene, character, body, found.x, found.pose.joints, skinned);
   const std::optional<PosedSkin> skin = judge_skin(scene, character, body, flesh, skinned, time);
   if (skin && scene.strict) refuse_torn(skin->finding);
   const std::string json = pose_json(scene, time, character.rig, body, found, cells, skin);

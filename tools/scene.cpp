@@ -52,13 +52,17 @@ std::string print_size(const BoneSize& size) {
   return fmt::format("\n[[size]]\nbones = {}\nfactor = {}\n", toml_quoted(size.bones, "bones"), size.factor);
 }
 
+std::string print_role(std::string_view table, const RoleOf& of) {
+  return fmt::format("\n[[{}]]\nname = {}\nrole = \"{}\"\n", table, toml_quoted(of.name, "name"),
+                     role_name(of.role));
+}
+
 /// Keys that say something about a rig; a plain scene has none of them.
 bool is_of_characters(std::string_view key) {
   constexpr std::string_view kKeys[] = {
       "rig",      "clip",          "lattice",   "lattice_space", "snap_tolerance", "soft_bones",
       "cache",    "cells",         "cell_size", "bones_include", "bones_exclude",  "tip_bones",
-      "symmetry", "coarsen_rigid", "height",    "output_space",  "output_mesh",
-      "guard"};
+      "symmetry", "coarsen_rigid", "height",    "output_space",  "output_mesh",    "guard"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 
@@ -75,6 +79,10 @@ void check_plain(const Scene& scene) {
   if (!scene.sizes.empty()) {
     throw assets::ConfigError(
         "[[size]]: expected none as the scene is a box without a rig; hint: [lattice] holds its cells");
+  }
+  if (!scene.part_roles.empty() || !scene.bone_roles.empty()) {
+    throw assets::ConfigError(
+        "role: expected none as the scene is a box without a rig, which is flesh; hint: leave it out");
   }
   if (!scene.young) {
     throw assets::ConfigError(
@@ -152,8 +160,25 @@ void Scene::validate() const {
     if (sizes[i].bones.empty()) throw assets::ConfigError(where + ": no bones, expected at least one name");
     check_number(size_factor_field(), sizes[i].factor, where + ": factor");
   }
+  for (const RoleOf& part : part_roles)
+    if (part.name.empty()) throw assets::ConfigError("part: no name, expected one or a pattern");
+  for (const RoleOf& bone : bone_roles)
+    if (bone.name.empty()) throw assets::ConfigError("bone: no name, expected one or a pattern");
   for (std::size_t i = 0; i < materials.size(); ++i) {
     check_material(*this, materials[i], fmt::format("material {}", i + 1));
+  }
+}
+
+std::string_view role_name(assets::PartRole role) {
+  switch (role) {
+    case assets::PartRole::Skinned:
+      return "skinned";
+    case assets::PartRole::Rigid:
+      return "rigid";
+    case assets::PartRole::Riding:
+      return "riding";
+    default:
+      return "flesh";
   }
 }
 
@@ -177,6 +202,8 @@ std::string print_scene(const Scene& scene) {
   if (scene.plain) text += print_plain_scene(*scene.plain);
   for (const BoneSize& size : scene.sizes) text += print_size(size);
   for (const BoneMaterial& material : scene.materials) text += print_material(material);
+  for (const RoleOf& part : scene.part_roles) text += print_role("part", part);
+  for (const RoleOf& bone : scene.bone_roles) text += print_role("bone", bone);
   return text;
 }
 
@@ -189,6 +216,11 @@ std::vector<int> matching(const std::string& pattern, const std::vector<std::str
 }
 
 std::string no_such_bone(const std::string& pattern, const std::vector<std::string>& names) {
+  return no_such("bone", pattern, names);
+}
+
+std::string no_such(const std::string& thing, const std::string& pattern,
+                    const std::vector<std::string>& names) {
   std::string letters = pattern;
   std::erase_if(letters, [](char letter) { return letter == '*' || letter == '?'; });
   const bool open_ended = pattern.ends_with('*');
@@ -198,10 +230,11 @@ std::string no_such_bone(const std::string& pattern, const std::vector<std::stri
   }
   std::string guess = nearest(letters, candidates);
   if (!guess.empty() && open_ended) guess += '*';
-  if (!guess.empty()) return fmt::format("no bone is named '{}'; hint: did you mean {}?", pattern, guess);
+  if (!guess.empty())
+    return fmt::format("no {} is named '{}'; hint: did you mean {}?", thing, pattern, guess);
   constexpr std::size_t kMost = 20;
   const std::size_t shown = std::min(names.size(), kMost);
-  return fmt::format("no bone is named '{}', expected one of {}{}", pattern,
+  return fmt::format("no {} is named '{}', expected one of {}{}", thing, pattern,
                      fmt::join(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
                      names.size() > shown ? fmt::format(" and {} more", names.size() - shown) : "");
 }

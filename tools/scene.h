@@ -3,10 +3,12 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "assets/rig.h"
 #include "fem/models/model.h"
 #include "tools/plain_scene.h"
 
@@ -58,6 +60,18 @@ struct BoneSize {
 
   friend bool operator==(const BoneSize&, const BoneSize&) = default;
 };
+
+/// How some pieces of the skin move: `[[part]]` and `[[bone]]` in a scene file.
+struct RoleOf {
+  /// Of parts or their islands (assets/islands.h), or of joints; * for any letters and ? for one.
+  std::string name;
+  assets::PartRole role = assets::PartRole::Simulated;
+
+  friend bool operator==(const RoleOf&, const RoleOf&) = default;
+};
+
+/// As scenes write it: flesh, skinned, rigid or riding.
+std::string_view role_name(assets::PartRole role);
 
 /// Where something was read from; no part of what it says.
 struct SourceFile {
@@ -111,6 +125,10 @@ struct Scene {
   Switch coarsen_rigid = Switch::Off;
   /// Cells of another size round some bones; a later one overrides an earlier one.
   std::vector<BoneSize> sizes;
+  /// Roles of parts and their islands; a later one overrides an earlier one, and all of them those of bones.
+  std::vector<RoleOf> part_roles;
+  /// Roles of what hangs on one joint alone; a later one overrides an earlier one.
+  std::vector<RoleOf> bone_roles;
   /// Finest active level of the hierarchy [-]; 0 ... 3. 1, as tetrahedra of level 0 alone are far too stiff.
   int levels = 1;
 
@@ -187,7 +205,9 @@ std::string print_scene(const Scene& scene);
 /// Indices of the names that a pattern fits; * stands for any letters, ? for one.
 std::vector<int> matching(const std::string& pattern, const std::vector<std::string>& names);
 
-/// One sentence for a pattern that fits none of them: the nearest, or the first of all.
+/// One sentence for a pattern that fits none of the names of such things: the nearest, or the first of all.
+std::string no_such(const std::string& thing, const std::string& pattern,
+                    const std::vector<std::string>& names);
 std::string no_such_bone(const std::string& pattern, const std::vector<std::string>& names);
 
 /// The joints that any of the patterns fits, ascending. Throws assets::ConfigError, opened by `where`, for a

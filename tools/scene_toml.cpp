@@ -76,6 +76,11 @@ class SceneReader : public detail::TomlReader {
       read_tables(node, key, [&](const toml::table& table, const std::string& where) {
         scene_.sizes.push_back(size(table, where));
       });
+    } else if (key == "part" || (key == "bone" && gives_roles(node))) {
+      std::vector<RoleOf>& list = key == "part" ? scene_.part_roles : scene_.bone_roles;
+      read_tables(node, key, [&](const toml::table& table, const std::string& where) {
+        list.push_back(role_of(table, where));
+      });
     } else if (std::find(plain_keys.begin(), plain_keys.end(), key) != plain_keys.end() &&
                (key != "lattice" || node.is_table())) {
       if (!scene_.plain) scene_.plain.emplace();
@@ -114,6 +119,7 @@ class SceneReader : public detail::TomlReader {
     if (field == nullptr) {
       std::vector<std::string> keys = detail::plain_scene_keys();
       keys.emplace_back("material");
+      keys.emplace_back("part");
       keys.emplace_back("size");
       for (const SceneField& known : scene_fields()) keys.emplace_back(known.key);
       std::sort(keys.begin(), keys.end());
@@ -222,6 +228,42 @@ class SceneReader : public detail::TomlReader {
                       place(table), where, size.bones.empty() ? "bones" : "factor"));
     }
     return size;
+  }
+
+  /// Bones of a rig have roles, those of a box have places.
+  static bool gives_roles(const toml::node& bones) {
+    const toml::array* array = bones.as_array();
+    if (array == nullptr) return false;
+    return std::any_of(array->begin(), array->end(), [](const toml::node& bone) {
+      return bone.is_table() && bone.as_table()->contains("role");
+    });
+  }
+
+  assets::PartRole role(const toml::node& node, const std::string& where) const {
+    const std::string name = string(node, where);
+    for (const assets::PartRole role : {assets::PartRole::Simulated, assets::PartRole::Skinned,
+                                        assets::PartRole::Rigid, assets::PartRole::Riding})
+      if (role_name(role) == name) return role;
+    throw ConfigError(
+        fmt::format("{}: got '{}', expected flesh, skinned, rigid or riding; hint: skinned", where, name));
+  }
+
+  RoleOf role_of(const toml::table& table, const std::string& where) const {
+    RoleOf of;
+    bool has_role = false;
+    read_table(table, where,
+               {{"name", [&](const toml::node& node, const std::string& at) { of.name = string(node, at); }},
+                {"role", [&](const toml::node& node, const std::string& at) {
+                   of.role = role(node, at);
+                   has_role = true;
+                 }}});
+    if (of.name.empty() || !has_role) {
+      throw ConfigError(
+          fmt::format("{}: {}: no {}, expected a name and a role; hint: name = \"sword*\", "
+                      "role = \"skinned\"",
+                      place(table), where, of.name.empty() ? "name" : "role"));
+    }
+    return of;
   }
 
   std::string file_;

@@ -21,15 +21,16 @@
 #include "assets/output_mesh.h"
 #include "assets/pc2.h"
 #include "assets/preview.h"
+#include "assets/riding.h"
 #include "assets/sidecar.h"
 #include "fem/envelope.h"
 #include "fem/placement.h"
-#include "fem/skin_guard.h"
 #include "lattice/limb_copies.h"
 #include "tools/body_fields.h"
 #include "tools/character.h"
 #include "tools/command.h"
 #include "tools/failure.h"
+#include "tools/frame_guard.h"
 #include "tools/interrupt.h"
 #include "tools/plain_loads.h"
 #include "tools/progress.h"
@@ -227,42 +228,6 @@ void write_companions(const Scene& scene, const Character& character, const Outp
   out.write("report.json", report_json(report, character, body));
 }
 
-<<<<<<< HEAD
-/// Mends the flesh of a frame against its plain skinning.
-class FrameGuard {
- public:
-  FrameGuard(const Scene& scene, const Character& character) : map_(character.input.skin.surface_of_vertex) {
-    const lattice::Surface& surface = character.input.skin.surface;
-    if (scene.guard == Switch::On && !scene.plain) guard_.emplace(surface.points, surface.triangles);
-    count_ = surface.points.rows();
-  }
-
-  /// Vertices of the result are those of the welded skin.
-  fem::Mended mend(CharacterFrame& frame) const {
-    if (!guard_) return {};
-    Points flesh(count_, 3), plain(count_, 3);
-    each([&](Eigen::Index row, int vertex) {
-      flesh.row(vertex) = frame.simulated.row(row);
-      plain.row(vertex) = frame.skinned.row(row);
-    });
-    const fem::Mended mended = guard_->mend(plain, flesh);
-    if (mended.vertex >= 0)
-      each([&](Eigen::Index row, int vertex) { frame.simulated.row(row) = flesh.row(vertex); });
-    return mended;
-  }
-
- private:
-  template <class Action>
-  void each(const Action& action) const {
-    for (std::size_t i = 0; i < map_.size(); ++i)
-      if (map_[i] >= 0) action(static_cast<Eigen::Index>(i), map_[i]);
-  }
-
-  const std::vector<int>& map_;
-  std::optional<fem::SkinGuard> guard_;
-  Eigen::Index count_ = 0;
-};
-
 /// One line on what was mended, and where most.
 void say_what_was_mended(const Character& character, const std::vector<FrameReport>& frames,
                          const Talk& talk) {
@@ -283,108 +248,104 @@ void say_what_was_mended(const Character& character, const std::vector<FrameRepo
                   ->mended.area,
       100.0 * most->mended.largest / character.rig.height, most->frame,
       joint < 0 ? std::string("the body") : character.input.joints.names[static_cast<std::size_t>(joint)]));
-=======
-/// The judge of a run's frames, and the time it takes.
-class Judge {
- public:
-  Judge(const Scene& scene, const Character& character, const FrameRange& frames) {
-    if (scene.plain) return;
-    std::vector<double> times;
-    for (int number = frames.first; number <= frames.last; ++number)
-      times.push_back(character.the_clip().start + number / scene.fps);
-    const auto start = std::chrono::steady_clock::now();
-    judge_ = make_skin_judge(character, times);
-    seconds_ += seconds_since(start);
-  }
-
-  std::optional<fem::SkinFrame> measure(const CharacterFrame& frame, fem::FrameKind kind) {
-    if (!judge_) return std::nullopt;
-    const auto start = std::chrono::steady_clock::now();
-    const fem::SkinFrame skin = judge_->measure(frame.simulated, frame.skinned, kind);
-    seconds_ += seconds_since(start);
-    return skin;
-  }
-
-  double seconds() const { return seconds_; }
-
- private:
-  std::optional<fem::SkinJudge> judge_;
-  double seconds_ = 0.0;
-};
-
-/// The verdict on the frames of the report.
-void find_fault(const Scene& scene, const Character& character, const fem::Body& body, RunReport& report) {
-  std::vector<fem::SkinFrame> skins;
-  std::vector<int> numbers;
-  for (const FrameReport& frame : report.frames) {
-    if (!frame.skin) return;
-    skins.push_back(*frame.skin);
-    numbers.push_back(frame.frame);
-  }
-  report.finding = find_fault(scene, character, body, skins, numbers);
->>>>>>> f8f8782 (WIP tools)
-}
-
-/// Steps through the frames, writes the cache and keeps what the preview shows.
-std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character& character,
-                                             const fem::Body& body, fem::Simulation& simulation,
-                                             const FrameRange& frames, const OutputLayout& layout,
-                                             const std::string& cache, RunReport& report) {
-  const double t0 = character.the_clip().start;
-  const int count = frames.last - frames.first + 1;
-  const std::vector<int> shown = assets::preview_frames(count);
-  std::vector<assets::PreviewFrame> preview;
-  Judge judge(scene, character, frames);
-  assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
-  const FrameGuard guard(scene, character);
-  Progress progress("simulating", count);
-  for (int k = 0; k < count; ++k) {
-    const int number = frames.first + k;
-    const double time = t0 + number / scene.fps;
-    const fem::SimulationReport step = simulation.advance_to(time);
-    if (step.status != fem::SimulationStatus::Ok) fail(character, step, fmt::format("frame {}", number));
-    const std::vector<Eigen::Affine3d> pose = character.pose(time);
-    const Points surface = simulation.skin_of(simulation.positions_at(time));
-    CharacterFrame frame = frame_at(character, pose, surface);
-    if (scene.offset) offset_from_skinning(character, body, pose, time, *scene.offset, frame);
-    const fem::Mended mended = guard.mend(frame);
-    try {
-      writer.write(layout.apply(frame.simulated));
-    } catch (const std::domain_error& error) {
-      throw NumericalError(
-          fmt::format("{}: frame {} at {:.6g} s: {}", character.rig.file, number, time, error.what()));
+  /// The judge of a run's frames, and the time it takes.
+  class Judge {
+   public:
+    Judge(const Scene& scene, const Character& character, const FrameRange& frames) {
+      if (scene.plain) return;
+      std::vector<double> times;
+      for (int number = frames.first; number <= frames.last; ++number)
+        times.push_back(character.the_clip().start + number / scene.fps);
+      const auto start = std::chrono::steady_clock::now();
+      judge_ = make_skin_judge(character, times);
+      seconds_ += seconds_since(start);
     }
-    FrameReport f;
-    f.frame = number;
-    f.time = time;
-    f.steps = step.steps;
-    f.measures = simulation.measures_at(time);
-<<<<<<< HEAD
-    f.mended = mended;
-    f.flipped_triangles = count_flipped_triangles(body, character.input.skin.surface, surface, pose);
-=======
-    f.skin = judge.measure(frame, k == 0 ? fem::FrameKind::First : fem::FrameKind::Later);
->>>>>>> f8f8782 (WIP tools)
-    report.frames.push_back(f);
-    if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
-      preview.push_back(
-          {number, time, frame.simulated, frame.skinned, posed_bones(character.lattice.lattice, pose)});
-    }
-    progress.update(k + 1);
-  }
-  writer.finish();
-  report.judging = judge.seconds();
-  return preview;
-}
 
-void write_picture(const Character& character, const std::vector<assets::PreviewFrame>& frames,
-                   const std::string& file) {
-  assets::PreviewOptions picture;
-  picture.caption =
-      std::filesystem::path(character.rig.file).stem().string() + ", " + character.the_clip().name;
-  picture.colours = assets::role_colours(character.rig);
-  assets::write_preview(file, all_triangles(character.rig), frames, picture);
-}
+    std::optional<fem::SkinFrame> measure(const CharacterFrame& frame, fem::FrameKind kind) {
+      if (!judge_) return std::nullopt;
+      const auto start = std::chrono::steady_clock::now();
+      const fem::SkinFrame skin = judge_->measure(frame.simulated, frame.skinned, kind);
+      seconds_ += seconds_since(start);
+      return skin;
+    }
+
+    double seconds() const { return seconds_; }
+
+   private:
+    std::optional<fem::SkinJudge> judge_;
+    double seconds_ = 0.0;
+  };
+
+  /// The verdict on the frames of the report.
+  void find_fault(const Scene& scene, const Character& character, const fem::Body& body, RunReport& report) {
+    std::vector<fem::SkinFrame> skins;
+    std::vector<int> numbers;
+    for (const FrameReport& frame : report.frames) {
+      if (!frame.skin) return;
+      skins.push_back(*frame.skin);
+      numbers.push_back(frame.frame);
+    }
+    report.finding = find_fault(scene, character, body, skins, numbers);
+  }
+
+  /// Steps through the frames, writes the cache and keeps what the preview shows.
+  std::vector<assets::PreviewFrame> run_frames(
+      const Scene& scene, const Character& character, const fem::Body& body, fem::Simulation& simulation,
+      const FrameRange& frames, const OutputLayout& layout, const std::string& cache, RunReport& report) {
+    const double t0 = character.the_clip().start;
+    const int count = frames.last - frames.first + 1;
+    const std::vector<int> shown = assets::preview_frames(count);
+    std::vector<assets::PreviewFrame> preview;
+    Judge judge(scene, character, frames);
+    assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
+    const FrameGuard guard(scene, character);
+    const assets::PropMotion props(character.rig);
+    Progress progress("simulating", count);
+    for (int k = 0; k < count; ++k) {
+      const int number = frames.first + k;
+      const double time = t0 + number / scene.fps;
+      const fem::SimulationReport step = simulation.advance_to(time);
+      if (step.status != fem::SimulationStatus::Ok) fail(character, step, fmt::format("frame {}", number));
+      const std::vector<Eigen::Affine3d> pose = character.pose(time);
+      const Points surface = simulation.skin_of(simulation.positions_at(time));
+      CharacterFrame frame = frame_at(character, pose, surface);
+      if (scene.offset) offset_from_skinning(character, body, pose, time, *scene.offset, frame);
+      const fem::Mended mended = guard.mend(frame.skinned, frame.simulated);
+      props.place(pose, frame.skinned, frame.simulated);
+      try {
+        writer.write(layout.apply(frame.simulated));
+      } catch (const std::domain_error& error) {
+        throw NumericalError(
+            fmt::format("{}: frame {} at {:.6g} s: {}", character.rig.file, number, time, error.what()));
+      }
+      FrameReport f;
+      f.frame = number;
+      f.time = time;
+      f.steps = step.steps;
+      f.measures = simulation.measures_at(time);
+      f.mended = mended;
+      f.flipped_triangles = count_flipped_triangles(body, character.input.skin.surface, surface, pose);
+      f.skin = judge.measure(frame, k == 0 ? fem::FrameKind::First : fem::FrameKind::Later);
+      report.frames.push_back(f);
+      if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
+        preview.push_back(
+            {number, time, frame.simulated, frame.skinned, posed_bones(character.lattice.lattice, pose)});
+      }
+      progress.update(k + 1);
+    }
+    writer.finish();
+    report.judging = judge.seconds();
+    return preview;
+  }
+
+  void write_picture(const Character& character, const std::vector<assets::PreviewFrame>& frames,
+                     const std::string& file) {
+    assets::PreviewOptions picture;
+    picture.caption =
+        std::filesystem::path(character.rig.file).stem().string() + ", " + character.the_clip().name;
+    picture.colours = assets::role_colours(character.rig);
+    assets::write_preview(file, all_triangles(character.rig), frames, picture);
+  }
 
 }  // namespace
 
@@ -431,7 +392,6 @@ void simulate(const Scene& scene, const Talk& talk) {
     simulation.set_velocity(starting_velocity(*scene.plain, simulation.state().x));
   report.settle_steps = settled.steps;
   report.settle_speed = settled.speed;
-<<<<<<< HEAD
   report.settle_joint = settled.fastest;
   report.settled = settled.settled;
   say_settling(scene, settled, body, talk);
@@ -439,7 +399,6 @@ void simulate(const Scene& scene, const Talk& talk) {
       run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
   lap("simulate and write frames");
   say_what_was_mended(character, report.frames, talk);
-=======
   check_settled(scene, character, settled, talk);
   talk(
       fmt::format("settled in {} steps; fastest flesh left {:.2g} mm/s", settled.steps, 1e3 * settled.speed));
@@ -450,7 +409,6 @@ void simulate(const Scene& scene, const Talk& talk) {
   report.times.emplace_back(kJudging, report.judging);
   find_fault(scene, character, body, report);
   if (report.finding && scene.strict) refuse_torn(*report.finding);
->>>>>>> f8f8782 (WIP tools)
   if (scene.preview == Switch::On) write_picture(character, preview, out.file(kPicture));
   lap("preview");
   report.counts = simulation.counts();

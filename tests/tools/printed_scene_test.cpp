@@ -44,6 +44,9 @@ Scene random_scene(std::mt19937_64& rng) {
   if (built && index(2) == 1) scene.coarsen_rigid = Switch::On;
   if (built && index(2) == 1) scene.sizes = {{{text(), "a*"}, 0.25 + 3.75 * unit()}, {{"b"}, 1.0}};
   if (index(2) == 1) scene.guard = Switch::Off;
+  if (index(2) == 1)
+    scene.part_roles = {{text(), static_cast<assets::PartRole>(index(4))}, {"b*", assets::PartRole::Rigid}};
+  if (index(2) == 1) scene.bone_roles = {{text(), static_cast<assets::PartRole>(index(4))}};
   scene.preview = index(2) == 1 ? Switch::On : Switch::Off;
   scene.levels = index(4);
   if (index(2) == 1) scene.young = 1.0 + 1e5 * unit();

@@ -89,6 +89,21 @@ TEST_F(SceneFile, SaysWhatIsWrongWithSizes) {
   EXPECT_EQ(refusal("[[size]]\nfactr = 0.5"), "scene.toml:2: factr: unknown key; hint: did you mean factor?");
 }
 
+TEST_F(SceneFile, SaysWhatIsWrongWithRoles) {
+  EXPECT_EQ(
+      refusal("[[part]]\nname = \"eye*\"\nrole = \"stiff\""),
+      "scene.toml:3: part 1: role: got 'stiff', expected flesh, skinned, rigid or riding; hint: skinned");
+  EXPECT_EQ(refusal("[[part]]\nrole = \"rigid\""),
+            "scene.toml:1: part 1: no name, expected a name and a role; hint: name = \"sword*\", role = "
+            "\"skinned\"");
+  EXPECT_EQ(refusal("[[bone]]\nname = \"head\"\nrole = \"riding\"\nsoft = true"),
+            "scene.toml:4: soft: unknown key, expected one of name, role");
+  // Bones with places belong to a box.
+  EXPECT_EQ(refusal("[[bone]]\nstart = [0, 0, 0]\nend = [1, 0, 0]"),
+            "scene.toml: [lattice]: missing, expected a box; hint: bones, fixed faces, loads and velocities "
+            "belong to scenes without a rig, whose flesh is a box");
+}
+
 TEST_F(SceneFile, KeepsTheDefaultsOfKeysLeftOut) { EXPECT_EQ(read(""), Scene{}); }
 
 TEST_F(SceneFile, SetsEveryKey) {
@@ -133,6 +148,18 @@ young = 5000.0
 bones = ["belly", "hip*"]
 factor = 0.5
 
+[[part]]
+name = "body/head*"
+role = "riding"
+
+[[bone]]
+name = "hand.R"
+role = "rigid"
+
+[[part]]
+name = "hair"
+role = "flesh"
+
 [[material]]
 bones = ["belly"]
 poisson = 0.3
@@ -153,6 +180,8 @@ region = "trunk"
   expected.guard = Switch::Off;
   expected.coarsen_rigid = Switch::On;
   expected.sizes = {{{"belly", "hip*"}, 0.5}};
+  expected.part_roles = {{"body/head*", assets::PartRole::Riding}, {"hair", assets::PartRole::Simulated}};
+  expected.bone_roles = {{"hand.R", assets::PartRole::Rigid}};
   expected.levels = 2;
   expected.young = 20000.0;
   expected.poisson = 0.49;
