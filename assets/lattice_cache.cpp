@@ -65,7 +65,7 @@ std::string hash_of(std::string_view text) {
 
 void add_options(Hash& hash, const lattice::BuildOptions& options) {
   // Fails to compile where a field is added: add it here, too.
-  const auto& [cells, cell_size, size_factors, coarsen_rigid, include, exclude, tip_bones, symmetry,
+  const auto& [cells, cell_size, size_factors, coarsen_rigid, grade, include, exclude, tip_bones, symmetry,
                construction, max_retries, min_dihedral_degrees, min_scaled_jacobian, poll] = options;
   static_cast<void>(poll);  // makes no difference to what is built
   hash.add(cells);
@@ -77,6 +77,7 @@ void add_options(Hash& hash, const lattice::BuildOptions& options) {
     hash.add(size.factor);
   }
   hash.add(static_cast<int>(coarsen_rigid));
+  hash.add(static_cast<int>(grade));
   for (const std::vector<int>* joints : {&include, &exclude}) {
     hash.add(static_cast<int>(joints->size()));
     for (int joint : *joints) hash.add(joint);

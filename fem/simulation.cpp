@@ -136,15 +136,8 @@ bool Simulation::check(SimulationReport& report) const {
   }
   if (worst < 0) return true;
   report.status = SimulationStatus::Diverged;
-<<<<<<< HEAD
   report.message = "the flesh of '" + joint_of(worst) + "' diverged at " + std::to_string(state_.time) +
-                   " s (lattice vertex " + std::to_string(worst) +
-                   "); a smaller --step, more --damping or --integrator backward-euler helps";
-=======
-  report.message = "the flesh of '" + body_.tree.frames[static_cast<std::size_t>(frame)].name +
-                   "' diverged at " + std::to_string(state_.time) +
                    " s; a smaller --step, more --damping or --integrator backward-euler helps";
->>>>>>> f8f8782 (WIP tools)
   return false;
 }
 

@@ -68,7 +68,7 @@ double smallest_edge_length(const RigInput& input, int wanted) {
   double h = 0.5;
   const auto grid_points = [&] { return (box.array() + 2.4 * h).prod() / (h * h * h); };
   while (grid_points() < 100.0 * wanted) h *= 0.9;
-  return h / input.sizes.largest();
+  return h / (input.sizes.largest(h) / h);
 }
 
 /// Secant search, in logarithms, for the h that gives the wanted number of cells.
@@ -170,7 +170,7 @@ ControlLattice make_attempt(const RigInput& input, double h, const Attempt& atte
   ControlLattice lattice = to_lattice(input, draft, h);
   separate_limbs(input, draft.skeleton, lattice);
   hang_joints(input, draft.skeleton, lattice);
-  if (!input.sizes.is_uniform()) lattice.edge_length = mean_target_edge(input, lattice, h);
+  if (!input.sizes.is_uniform(h)) lattice.edge_length = mean_target_edge(input, lattice, h);
   return lattice;
 }
 

@@ -35,6 +35,9 @@ enum class Construction {
 /// Whether cells are larger where the skin moves as one stiff piece.
 enum class CoarsenRigid { Off, On };
 
+/// Whether cells are smaller where limbs are thin.
+enum class Grade { Off, On };
+
 /// Controls of the lattice builder.
 struct BuildOptions {
   /// Wanted number of cells [-]; >= 20. The secant search on h lands within about 10 %.
@@ -49,6 +52,12 @@ struct BuildOptions {
   /// `size_factors` say, the farther from joints and blended weights the nearer to that. Off, as such skin
   /// does not bend with its bones but still swings on them, and a coarse lattice is stiffer.
   CoarsenRigid coarsen_rigid = CoarsenRigid::Off;
+  /// With On, the flesh of a joint whose limb is thinner than half the target edge gets an edge of twice its
+  /// thickness (0.4 h at least), so that limbs side by side are not one sheet: of the wanted number of cells
+  /// more lie in the limbs and fewer in the trunk. Where all limbs are that thin, the thickest has the target
+  /// edge. `size_factors` win where they name the joint. Fingers, eyes and the like (joints with less than a
+  /// hundredth of the skin) are left as they are.
+  Grade grade = Grade::On;
   /// Joints that take part: where not empty, all others are treated as excluded.
   std::vector<int> include = {};
   /// Joints that get neither a bone nor a frame: their children hang on the joint above, and so does their

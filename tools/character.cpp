@@ -22,6 +22,7 @@
 #include "tools/plain_loads.h"
 #include "tools/roles.h"
 #include "tools/suggest.h"
+#include "tools/thin_limbs.h"
 
 namespace sinew::tools {
 namespace {
@@ -41,7 +42,8 @@ class Phase {
   Clock::time_point start_;
 };
 
-void report_lattice(const Scene& scene, const lattice::BuildResult& result, const Talk& talk) {
+void report_lattice(const Scene& scene, const lattice::BuildResult& result, const assets::LatticeInput& input,
+                    const Talk& talk) {
   for (const lattice::GateFailure& failure : result.failures) {
     if (!failure.tolerable) {
       throw NumericalError(
@@ -54,6 +56,9 @@ void report_lattice(const Scene& scene, const lattice::BuildResult& result, cons
   if (result.lattice.is_grid && !result.refused.empty())
     talk("warning: lattice: a plain grid of cubes with soft bones, as with bones on edges " +
          result.refused.front().failures.front().what);
+  if (const auto thin = find_thin_limb(result.lattice, input.skin.surface, input.joints.names))
+    talk(fmt::format("warning: lattice: {}; hint: {}", thin->message(),
+                     scene.lattice.empty() ? thin->remedy() : "a lattice with smaller cells there"));
 }
 
 /// Poses of the whole clip, `spacing` apart; enough to see every bend of a clip keyed at 24 to 60 Hz.
@@ -269,6 +274,7 @@ lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::s
   options.exclude = joints_of(scene.bones_exclude, joints, "bones_exclude");
   options.tip_bones = scene.tip_bones == Switch::On ? lattice::TipBones::On : lattice::TipBones::Off;
   options.symmetry = scene.symmetry == Switch::On ? lattice::Symmetry::Auto : lattice::Symmetry::Off;
+  options.grade = scene.grade == Switch::On ? lattice::Grade::On : lattice::Grade::Off;
   options.coarsen_rigid =
       scene.coarsen_rigid == Switch::On ? lattice::CoarsenRigid::On : lattice::CoarsenRigid::Off;
   std::map<int, double> factors;
@@ -355,7 +361,7 @@ void load_rig(const Scene& scene, const Talk& talk, Character& c) {
       c.lattice.failures = lattice::check_gate(c.lattice.lattice, c.input.skin.surface, options);
     }
   }
-  report_lattice(scene, c.lattice, talk);
+  report_lattice(scene, c.lattice, c.input, talk);
   warn_of_idle_sizes(c.lattice, c.input.joints.names, talk);
 }
 

@@ -19,6 +19,7 @@
 #include "tools/exit_code.h"
 #include "tools/failure.h"
 #include "tools/roles.h"
+#include "tools/thin_limbs.h"
 
 namespace sinew::tools {
 namespace {
@@ -80,6 +81,9 @@ void find_bones(Inspection& result) {
                                    "check that the mesh has a volume and is bound to its skeleton"});
     return;
   }
+  if (const auto thin = find_thin_limb(built.lattice, input.skin.surface, input.joints.names))
+    result.rig.findings.push_back(
+        {Finding::Severity::Info, "thin-limbs", thin->joint, thin->message(), thin->remedy()});
   result.bones = std::move(built.lattice.bones);
   result.changes = std::move(built.lattice.changes);
   for (const lattice::LatticeBone& bone : result.bones) {

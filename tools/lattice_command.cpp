@@ -26,6 +26,7 @@
 #include "tools/lattice_memory.h"
 #include "tools/roles.h"
 #include "tools/scene_flags.h"
+#include "tools/thin_limbs.h"
 
 namespace sinew::tools {
 namespace {
@@ -34,9 +35,9 @@ using Json = nlohmann::ordered_json;
 
 /// Keys of a scene that this command knows.
 constexpr std::string_view kKeys[] = {
-    "output",         "overwrite",  "json",     "preview",       "lattice",   "lattice_space",
-    "snap_tolerance", "soft_bones", "cache",    "cells",         "cell_size", "bones_include",
-    "bones_exclude",  "tip_bones",  "symmetry", "coarsen_rigid", "height"};
+    "output",         "overwrite",  "json",     "preview", "lattice",       "lattice_space",
+    "snap_tolerance", "soft_bones", "cache",    "cells",   "cell_size",     "bones_include",
+    "bones_exclude",  "tip_bones",  "symmetry", "grade",   "coarsen_rigid", "height"};
 
 Json to_json(const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
@@ -75,7 +76,8 @@ std::string gate_message(const std::string& rig, const lattice::BuildResult& res
       shown.what, more, result.lattice.retries, 2 * result.lattice.complex.cells.size());
 }
 
-void print_summary(const std::string& output, const lattice::BuildResult& result, double seconds) {
+void print_summary(const std::string& output, const Character& character, double seconds) {
+  const lattice::BuildResult& result = character.lattice;
   const lattice::ControlLattice& lattice = result.lattice;
   const lattice::LatticeQuality& q = lattice.quality;
   int hard = 0, tips = 0, soft = 0;
@@ -103,6 +105,9 @@ void print_summary(const std::string& output, const lattice::BuildResult& result
     fmt::print(stderr, "  limbs: {} places are shared and have a cell for each limb, {} in all\n",
                places.size(), lattice.copies.size());
   }
+  const std::vector<std::string>& joints = character.input.joints.names;
+  if (const auto thin = find_thin_limb(lattice, character.input.skin.surface, joints))
+    fmt::print(stderr, "  size: {}; hint: {}\n", single_line(thin->message()), thin->remedy());
   if (result.mirror) {
     const Eigen::Vector3d& n = result.mirror->normal;
     fmt::print(stderr, "  symmetry: mirrored in a plane with the normal ({:.3g}, {:.3g}, {:.3g})\n", n.x(),
@@ -287,7 +292,7 @@ void run_lattice(const LatticeRequest& request) {
     assets::keep_lattice(assets::cache_folder(scene.output), built.key, character.lattice, joints);
   if (scene.json) std::cout << lattice_report(character.lattice, joints);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  print_summary(scene.output, character.lattice, elapsed.count());
+  print_summary(scene.output, character, elapsed.count());
 }
 
 void add_lattice_command(CLI::App& app, CommandContext&) {

@@ -14,25 +14,6 @@ using Json = nlohmann::ordered_json;
 
 Json frame_json(const FrameReport& f, int active, const assets::Rig& rig) {
   const fem::Measures& m = f.measures;
-<<<<<<< HEAD
-  return {{"frame", f.frame},
-          {"time_s", f.time},
-          {"steps", f.steps},
-          {"active_functions", active},
-          {"kinetic_J", m.kinetic},
-          {"elastic_J", m.elastic},
-          {"potential_J", m.potential},
-          {"ties_J", m.ties},
-          {"ghost_J", m.ghost},
-          {"largest_speed_m_per_s", m.largest_speed},
-          {"bone_residual_m", m.bone_residual},
-          {"largest_strain", m.largest_strain},
-          {"min_det_j", m.min_det},
-          {"inverted_cells", m.inverted_cells},
-          {"mended_area", f.mended.area},
-          {"largest_mended_m", f.mended.largest},
-          {"flipped_triangles", f.flipped_triangles}};
-=======
   Json json{{"frame", f.frame},
             {"time_s", f.time},
             {"steps", f.steps},
@@ -41,11 +22,14 @@ Json frame_json(const FrameReport& f, int active, const assets::Rig& rig) {
             {"elastic_J", m.elastic},
             {"potential_J", m.potential},
             {"ties_J", m.ties},
+            {"ghost_J", m.ghost},
             {"largest_speed_m_per_s", m.largest_speed},
             {"bone_residual_m", m.bone_residual},
             {"largest_strain", m.largest_strain},
             {"min_det_j", m.min_det},
-            {"inverted_cells", m.inverted_cells}};
+            {"inverted_cells", m.inverted_cells},
+            {"mended_area", f.mended.area},
+            {"largest_mended_m", f.mended.largest}};
   if (f.skin) {
     json["flipped_triangles"] = f.skin->flipped;
     json["skin"] = detail::skin_json(*f.skin, rig);
@@ -59,7 +43,6 @@ Json finding_json(const SkinFinding& finding) {
           {"worst_place", finding.place},
           {"torn_frames", finding.torn_frames},
           {"line", finding.line}};
->>>>>>> f8f8782 (WIP tools)
 }
 
 Json lattice_json(const lattice::ControlLattice& lattice) {

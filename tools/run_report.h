@@ -19,12 +19,8 @@ struct FrameReport {
   double time = 0.0;  ///< of the clip [s].
   int steps = 0;      ///< taken since the frame before.
   fem::Measures measures;
-<<<<<<< HEAD
-  fem::Mended mended;         ///< of the skin; lengths [m].
-  int flipped_triangles = 0;  ///< skin triangles that face against their bones' rotation.
-=======
+  fem::Mended mended;                  ///< of the skin; lengths [m].
   std::optional<fem::SkinFrame> skin;  ///< empty for a plain scene, which nobody skins.
->>>>>>> f8f8782 (WIP tools)
 };
 
 /// The phase of judging the skin, which is no part of making it.

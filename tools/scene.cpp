@@ -60,9 +60,10 @@ std::string print_role(std::string_view table, const RoleOf& of) {
 /// Keys that say something about a rig; a plain scene has none of them.
 bool is_of_characters(std::string_view key) {
   constexpr std::string_view kKeys[] = {
-      "rig",      "clip",          "lattice",   "lattice_space", "snap_tolerance", "soft_bones",
-      "cache",    "cells",         "cell_size", "bones_include", "bones_exclude",  "tip_bones",
-      "symmetry", "coarsen_rigid", "height",    "output_space",  "output_mesh",    "guard"};
+      "rig",      "clip",  "lattice",       "lattice_space", "snap_tolerance", "soft_bones",
+      "cache",    "cells", "cell_size",     "bones_include", "bones_exclude",  "tip_bones",
+      "symmetry", "grade", "coarsen_rigid", "height",        "output_space",   "output_mesh",
+      "guard"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 
@@ -94,7 +95,7 @@ void check_plain(const Scene& scene) {
 /// A lattice that is read is not built.
 void check_no_builder_keys(const Scene& scene) {
   const Scene defaults;
-  for (const char* key : {"cell_size", "bones_include", "bones_exclude", "coarsen_rigid"}) {
+  for (const char* key : {"cell_size", "bones_include", "bones_exclude", "grade", "coarsen_rigid"}) {
     const SceneField& field = *find_scene_field(key);
     if (flag_text(scene, field) == flag_text(defaults, field)) continue;
     throw assets::ConfigError(

@@ -121,6 +121,8 @@ struct Scene {
   Switch tip_bones = Switch::On;
   /// A mirror-symmetric rig gets a mirror-symmetric lattice; off: nobody looks.
   Switch symmetry = Switch::On;
+  /// Smaller cells where limbs are thin, and larger ones elsewhere.
+  Switch grade = Switch::On;
   /// Larger cells where the skin follows one bone alone, away from joints.
   Switch coarsen_rigid = Switch::Off;
   /// Cells of another size round some bones; a later one overrides an earlier one.

@@ -62,6 +62,7 @@ constexpr auto kFields = std::to_array<SceneField>({
      "joints that have none; what hangs on them hangs on the joint above"},
     {"tip_bones", &Scene::tip_bones, "on or off: bones for weighted joints without children"},
     {"symmetry", &Scene::symmetry, "on or off: a mirror-symmetric lattice for a mirror-symmetric rig"},
+    {"grade", &Scene::grade, "on or off: smaller cells where limbs are thin, larger ones elsewhere"},
     {"coarsen_rigid", &Scene::coarsen_rigid,
      "on or off: larger cells where the skin follows one bone alone, away from joints"},
     {"levels", &Scene::levels, "finest active level of the hierarchy", "levels", {0, 3}, "", "1"},

@@ -62,8 +62,8 @@ class Crystal {
         h_(h),
         out_(out),
         far_(skin.points.cwiseAbs().colwise().maxCoeff().transpose().array() +
-             kReach * h * options.sizes->largest()),
-        taken_(h * std::sqrt(options.sizes->smallest() * options.sizes->largest())) {}
+             kReach * options.sizes->largest(h)),
+        taken_(std::sqrt(options.sizes->smallest(h) * options.sizes->largest(h))) {}
 
   /// Takes p where there is room, and all that grows from it.
   void grow_from(const Vector3d& p, double room) {
@@ -113,7 +113,7 @@ void place_graded_points(const UnitSkin& skin, const BoneClearance& clearance, d
                          const PointOptions& options, LatticePoints& out) {
   Crystal crystal(skin, clearance, h, options, out);
   // One crystal for all that hangs together, from the middle of the skin's box; others for what is left.
-  Vector3d middle = Vector3d::Constant(options.shift * 2.0 * h * options.sizes->largest() / std::sqrt(3.0));
+  Vector3d middle = Vector3d::Constant(options.shift * 2.0 * options.sizes->largest(h) / std::sqrt(3.0));
   if (out.half) middle.x() = 0.0;
   Eigen::Index nearest = 0;
   (skin.points.rowwise() - middle.transpose()).rowwise().squaredNorm().minCoeff(&nearest);

@@ -29,7 +29,7 @@ std::vector<double> bone_samples(const Vector3d& a, const Vector3d& b, double h,
                                  const PointOptions& options) {
   const double length = (b - a).norm();
   std::vector<double> samples;
-  if (options.is_uniform()) {
+  if (options.is_uniform(h)) {
     const int pieces = std::max(1, static_cast<int>(std::lround(length / (kBoneSpacing * h))));
     for (int i = 1; i < pieces; ++i) samples.push_back(static_cast<double>(i) / pieces);
     return samples;
@@ -143,7 +143,7 @@ LatticePoints place_points(const UnitSkin& skin, const ReducedSkeleton& skeleton
   out.half = !skeleton.mirror_bone.empty();
   place_bones(skeleton, h, options, out);
   const BoneClearance clearance(out, h, options);
-  if (!options.is_uniform()) {
+  if (!options.is_uniform(h)) {
     place_graded_points(skin, clearance, h, options, out);
     return out;
   }

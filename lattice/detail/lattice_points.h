@@ -46,7 +46,7 @@ struct PointOptions {
   double edge_at(const Eigen::Vector3d& p, double h) const {
     return sizes == nullptr ? h : sizes->edge_at(p, h);
   }
-  bool is_uniform() const { return sizes == nullptr || sizes->is_uniform(); }
+  bool is_uniform(double h) const { return sizes == nullptr || sizes->is_uniform(h); }
 };
 
 /// True where a free point would come too close to a piece of some bone: the ball about the middle of each

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "lattice/detail/cell_flesh.h"
 #include "lattice/detail/cell_locator.h"
 #include "lattice/detail/point_finder.h"
 #include "lattice/detail/segments.h"
@@ -21,6 +22,8 @@ using Eigen::Vector3d;
 
 /// Flesh farther apart than this along the skeleton belongs to different limbs, in units of h.
 constexpr double kLimbDistance = 1.5;
+/// Where flesh is looked for behind the skin, in units of h.
+constexpr double kSheetDepth = 0.02;
 constexpr double kSoftBoneSpacing = 0.25;  ///< of the points along soft bones, in units of h.
 constexpr double kInsideSlack = 1e-9;
 constexpr double kImageTolerance = 1e-9;  ///< of a vertex and the image of its partner, unit coordinates.
@@ -48,6 +51,35 @@ std::vector<TriangleCorners> corners_of(const UnitSkin& skin) {
     triangles.push_back({skin.points.row(skin.triangles(t, 0)), skin.points.row(skin.triangles(t, 1)),
                          skin.points.row(skin.triangles(t, 2))});
   return triangles;
+}
+
+/// The frames of the corners of every welded triangle. They are those of the caller's vertices: pieces that
+/// touch are welded, and the point that they share has the weights of one of them.
+std::vector<std::array<int, 3>> frames_of_triangles(const RigInput& input,
+                                                    const std::vector<int>& frame_of_joint) {
+  using Corner = std::array<int, 2>;  // welded point, frame
+  std::map<std::array<int, 3>, std::array<Corner, 3>> corners_of;
+  for (Eigen::Index t = 0; t < input.skin.triangles.rows(); ++t) {
+    std::array<Corner, 3> corners;
+    for (int k = 0; k < 3; ++k) {
+      const auto v = static_cast<std::size_t>(input.skin.triangles(t, k));
+      corners[k] = {input.unit_skin.welded[v], skin_frame(input.skin.weights[v], frame_of_joint)};
+    }
+    std::sort(corners.begin(), corners.end());
+    const std::array<int, 3> key{corners[0][0], corners[1][0], corners[2][0]};
+    const auto [found, fresh] = corners_of.emplace(key, corners);
+    if (!fresh) found->second = std::min(found->second, corners);  // whatever the order of doubled triangles
+  }
+  const Triangles& triangles = input.unit_skin.triangles;
+  std::vector<std::array<int, 3>> frames(static_cast<std::size_t>(triangles.rows()));
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
+    std::array<int, 3> key{triangles(t, 0), triangles(t, 1), triangles(t, 2)};
+    std::sort(key.begin(), key.end());
+    for (const auto& [welded, frame] : corners_of.at(key))
+      for (int k = 0; k < 3; ++k)
+        if (triangles(t, k) == welded) frames[static_cast<std::size_t>(t)][k] = frame;
+  }
+  return frames;
 }
 
 }  // namespace
@@ -87,7 +119,8 @@ LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const C
       skeleton_(skeleton),
       lattice_(lattice),
       distance_(skeleton),
-      h_(lattice.edge_length / input.unit_skin.scale) {
+      h_(lattice.edge_length / input.unit_skin.scale),
+      grid_(corners_of(input.unit_skin), kGridSide * h_) {
   std::vector<int> frames;
   for (const ReducedBone& bone : skeleton.bones) frames.push_back(bone.frame);
   const std::vector<int> bone_frame = detail::frame_of_joint(input.joints.parents, frames);
@@ -97,17 +130,22 @@ LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const C
   for (std::size_t j = 0; j < bone_frame.size(); ++j)
     for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
       if (skeleton.bones[b].frame == bone_frame[j]) bones_of_[j].push_back(b);
-  for (const std::vector<Influence>& influences : input.unit_skin.weights)
-    frame_of_vertex_.push_back(skin_frame(influences, frame_of_joint_));
+  const UnitSkin& skin = input.unit_skin;
+  frames_ = frames_of_triangles(input, frame_of_joint_);
+  for (std::size_t v = 0; v < skin.weights.size(); ++v) {
+    const Vector3d p = skin.points.row(static_cast<Eigen::Index>(v)).transpose();
+    is_sheet_.push_back(!skin.is_inside(p - kSheetDepth * h_ * skin.normals[v]));
+  }
 
   std::vector<Label> labels(lattice.complex.cells.size());
   label_skin(labels, faces);
   label_bones(labels);
-  if (input.mirror) mirror(labels);
   for (std::size_t c = 0; c < labels.size(); ++c) {
     input_.poll();
-    limbs_.push_back(gather(labels[c], edge_at(lattice.complex.cells[c].vertices)));
+    join_flesh(labels[c], lattice.complex.cells[c]);
   }
+  if (input.mirror) mirror(labels);
+  for (const Label& label : labels) limbs_.push_back(gather(label));
 }
 
 LimbPiece LimbMap::piece_at(int frame, const Vector3d& p) const {
@@ -131,8 +169,18 @@ void LimbMap::add(Label& label, int frame, const Vector3d& p) const {
   merge(label.pieces, piece_at(frame, p));
 }
 
+void LimbMap::add_bone(Label& label, int bone, const Vector3d& p) const {
+  merge(label.pieces, bone_at(bone, p)[0]);
+  label.bones.emplace_back(skeleton_.bones[bone].frame, p);
+}
+
 /// A triangle of the skin in a cell: its corners must not part, whatever they hang on.
-void LimbMap::add_triangle(Label& label, const std::array<int, 3>& frames, const Vector3d& p) const {
+void LimbMap::add_triangle(Label& label, int triangle, const Vector3d& p) const {
+  const std::array<int, 3>& frames = frames_[triangle];
+  for (int k = 0; k < 3; ++k) {
+    const int v = input_.unit_skin.triangles(triangle, k);
+    (is_sheet_[v] ? label.sheets : label.skins).push_back(frames[k]);
+  }
   for (int k = 0; k < 3; ++k) {
     if (k > 0 && frames[k] == frames[k - 1]) continue;
     add(label, frames[k], p);
@@ -155,16 +203,11 @@ void LimbMap::label_skin(std::vector<Label>& labels, const std::vector<CellFace>
     const int frame = skin_frame(input_.skin.weights[v], frame_of_joint_);
     for (int c : cells_of[welded]) add(labels[c], frame, skin.points.row(welded).transpose());
   }
-  const auto frames = [&](int t) -> std::array<int, 3> {
-    return {frame_of_vertex_[skin.triangles(t, 0)], frame_of_vertex_[skin.triangles(t, 1)],
-            frame_of_vertex_[skin.triangles(t, 2)]};
-  };
   for (int t = 0; t < skin.triangles.rows(); ++t)
     for (int k = 0; k < 3; ++k) {
       const int v = skin.triangles(t, k);
-      for (int c : cells_of[v]) add_triangle(labels[c], frames(t), skin.points.row(v).transpose());
+      for (int c : cells_of[v]) add_triangle(labels[c], t, skin.points.row(v).transpose());
     }
-  const TriangleGrid grid(corners_of(skin), kGridSide * h_);
   for (const CellFace& face : faces) {
     input_.poll();
     const int n = face.vertices[3] < 0 ? 3 : 4;
@@ -176,12 +219,12 @@ void LimbMap::label_skin(std::vector<Label>& labels, const std::vector<CellFace>
     }
     const auto visit = [&](int t) {
       for (const int cell : {face.first, face.second})
-        if (cell >= 0) add_triangle(labels[cell], frames(t), mean);
+        if (cell >= 0) add_triangle(labels[cell], t, mean);
       return true;
     };
-    if (n == 3) grid.for_each_crossing({corners[0], corners[1], corners[2]}, 0.0, visit);
+    if (n == 3) grid_.for_each_crossing({corners[0], corners[1], corners[2]}, 0.0, visit);
     for (int k = 0; n == 4 && k < 4; ++k)
-      grid.for_each_crossing({corners[k], corners[(k + 1) % 4], mean}, 0.0, visit);
+      grid_.for_each_crossing({corners[k], corners[(k + 1) % 4], mean}, 0.0, visit);
   }
 }
 
@@ -207,9 +250,10 @@ void LimbMap::label_bones(std::vector<Label>& labels) const {
       const auto found =
           std::lower_bound(edges.begin(), edges.end(), Edge{std::min(a, b), std::max(a, b), 0}, before);
       if (found == edges.end() || found->low != std::min(a, b) || found->high != std::max(a, b)) continue;
-      for (const int v : {a, b})
-        merge(labels[c].pieces,
-              bone_at(found->bone, skin.to_unit(lattice_.complex.points.row(v).transpose()))[0]);
+      const Vector3d start = skin.to_unit(lattice_.complex.points.row(a).transpose());
+      const Vector3d end = skin.to_unit(lattice_.complex.points.row(b).transpose());
+      for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0})
+        add_bone(labels[c], found->bone, (1.0 - s) * start + s * end);
     }
   }
   const CellLocator locator(lattice_.complex);
@@ -223,7 +267,7 @@ void LimbMap::label_bones(std::vector<Label>& labels) const {
     for (int i = 0; i <= n; ++i) {
       const Vector3d p = bone.rest_start + (bone.rest_end - bone.rest_start) * (static_cast<double>(i) / n);
       locator.find_all(p, kInsideSlack, cells);
-      for (int c : cells) merge(labels[c].pieces, bone_at(b, skin.to_unit(p))[0]);
+      for (int c : cells) add_bone(labels[c], b, skin.to_unit(p));
     }
   }
   for (const SoftFrame& soft : skeleton_.soft_frames) {
@@ -269,7 +313,46 @@ void LimbMap::mirror(std::vector<Label>& labels) const {
   }
 }
 
-std::vector<Limb> LimbMap::gather(const Label& label, double edge) const {
+/// Frames whose flesh hangs together in the cell.
+void LimbMap::join_flesh(Label& label, const Cell& cell) const {
+  const double reach = kLimbDistance * edge_at(cell.vertices);
+  const std::vector<Limb> limbs = gather(label);
+  std::vector<std::array<int, 2>> near;
+  for (std::size_t i = 0; i < limbs.size(); ++i)
+    for (std::size_t k = i + 1; k < limbs.size(); ++k)
+      for (const LimbPiece& a : limbs[i])
+        for (const LimbPiece& b : limbs[k])
+          if (distance_.between(a.stretch, b.stretch) < reach) near.push_back({a.frame, b.frame});
+  if (near.empty()) return;
+  std::vector<Vector3d> corners;
+  for (int k = 0; k < num_corners(cell.type); ++k)
+    corners.push_back(input_.unit_skin.to_unit(lattice_.complex.points.row(cell.vertices[k]).transpose()));
+  CellFlesh flesh(input_.unit_skin, grid_, frames_, corners);
+  for (const auto& [frame, p] : label.bones) flesh.add(frame, p);
+  const auto holds = [](const std::vector<int>& frames, int frame) {
+    return std::find(frames.begin(), frames.end(), frame) != frames.end();
+  };
+  const auto above = [&](int frame) {
+    const int parent = input_.unit_joints.parents[frame];
+    return parent < 0 ? -1 : frame_of_joint_[parent];
+  };
+  // A corner of a limb that no sample is in is flesh that reaches nothing here.
+  const auto is_speck = [&](int frame) {
+    return !flesh.has(frame) && holds(label.skins, frame) && !holds(label.sheets, frame);
+  };
+  for (const auto& [a, b] : near) {
+    const bool both_known = flesh.has(a) && flesh.has(b);
+    const CellFlesh::Contact contact = flesh.contact(a, b);
+    const bool are_one =
+        both_known ? contact == CellFlesh::Contact::Continuous ||
+                         (contact == CellFlesh::Contact::Overlap && (above(a) == b || above(b) == a))
+                   : !is_speck(a) && !is_speck(b);
+    if (are_one) label.joined.push_back({a, b});
+  }
+}
+
+/// Pieces of one frame, and of frames that are joined.
+std::vector<Limb> LimbMap::gather(const Label& label) const {
   std::vector<LimbPiece> pieces = label.pieces;
   std::sort(pieces.begin(), pieces.end(), is_before);
   const int n = static_cast<int>(pieces.size());
@@ -287,8 +370,7 @@ std::vector<Limb> LimbMap::gather(const Label& label, double edge) const {
   for (int i = 0; i < n; ++i)
     for (int k = i + 1; k < n; ++k) {
       const int a = root(i), b = root(k);
-      if (a != b &&
-          (are_together({pieces[i]}, {pieces[k]}, edge) || is_joined(pieces[i].frame, pieces[k].frame)))
+      if (a != b && (pieces[i].frame == pieces[k].frame || is_joined(pieces[i].frame, pieces[k].frame)))
         group[std::max(a, b)] = std::min(a, b);
     }
   std::vector<Limb> limbs;
@@ -314,12 +396,16 @@ double LimbMap::distance(const Limb& a, const Limb& b) const {
   return shortest;
 }
 
-bool LimbMap::are_together(const Limb& a, const Limb& b, double edge) const {
-  return distance(a, b) < kLimbDistance * edge;
+bool LimbMap::share_frame(const Limb& a, const Limb& b) {
+  return std::any_of(a.begin(), a.end(), [&](const LimbPiece& x) {
+    return std::any_of(b.begin(), b.end(), [&](const LimbPiece& y) { return x.frame == y.frame; });
+  });
 }
 
+/// Mean target edge at vertices of the lattice (-1: none), unit coordinates.
+
 double LimbMap::edge_at(std::span<const int> vertices) const {
-  if (lattice_.is_grid || input_.sizes.is_uniform()) return h_;
+  if (lattice_.is_grid || input_.sizes.is_uniform(h_)) return h_;
   double sum = 0.0, count = 0.0;
   for (const int v : vertices) {
     if (v < 0) continue;
@@ -340,7 +426,7 @@ std::optional<Limb> LimbMap::own_flesh_at(const Vector3d& p) const {
   for (int k = 0; k < 3; ++k) {
     const int v = skin.triangles(closest.triangle, k);
     const double d = (skin.points.row(v).transpose() - closest.point).squaredNorm();
-    if (d < best) best = d, nearest = frame_of_vertex_[v];
+    if (d < best) best = d, nearest = frames_[closest.triangle][k];
   }
   return nearest < 0 ? Limb{} : Limb{piece_at(nearest, closest.point)};
 }

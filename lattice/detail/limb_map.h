@@ -3,11 +3,13 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "lattice/control_lattice.h"
 #include "lattice/detail/rig_input.h"
 #include "lattice/detail/skeleton_distance.h"
+#include "lattice/detail/triangle_grid.h"
 
 namespace sinew::lattice::detail {
 
@@ -31,8 +33,11 @@ struct LimbPiece {
 using Limb = std::vector<LimbPiece>;
 
 /// Which limbs lie in which cell. Skin and bones in a cell are of one limb if they follow the same frame, if
-/// one triangle of the skin hangs on both, or if they are less than 1.5 h apart along the skeleton, h the
-/// target edge of the place.
+/// one triangle of the skin hangs on both, or if flesh of both hangs together in the cell: without skin
+/// between them, or, of a joint and the one above it, through each other's skin. That holds only where they
+/// are less than 1.5 h apart along the skeleton, h the target edge of the place: flesh of a hand that rests
+/// on a thigh is not of one limb with it. Of sheets and of bones outside the flesh nobody knows where flesh
+/// is: there the way along the skeleton decides alone.
 ///
 /// Of a mirrored rig what is found in a place is also there in its mirror image: triangles may be split in
 /// two ways, and a vertex in the plane follows one frame of two alike.
@@ -46,10 +51,8 @@ class LimbMap {
   const std::vector<Limb>& limbs(int cell) const { return limbs_[cell]; }
   /// Shortest way along the skeleton, unit coordinates; 0 where they follow the same frame.
   double distance(const Limb& a, const Limb& b) const;
-  /// Whether they are one limb where the target edge is `edge` (unit coordinates).
-  bool are_together(const Limb& a, const Limb& b, double edge) const;
-  /// Mean target edge at vertices of the lattice (-1: none), unit coordinates.
-  double edge_at(std::span<const int> vertices) const;
+  /// Whether flesh of one frame is in both.
+  static bool share_frame(const Limb& a, const Limb& b);
   /// Of the flesh at p (unit coordinates): as the closest skin; of a mirrored rig also as the image of what
   /// is at the image of p. None outside the skin.
   std::vector<Limb> flesh_at(const Eigen::Vector3d& p) const;
@@ -62,7 +65,10 @@ class LimbMap {
   /// What is known of a cell before its pieces are gathered to limbs.
   struct Label {
     std::vector<LimbPiece> pieces;
-    std::vector<std::array<int, 2>> joined;  ///< frames.
+    std::vector<std::array<int, 2>> joined;              ///< frames.
+    std::vector<int> skins;                              ///< frames of skin that is there.
+    std::vector<int> sheets;                             ///< frames of skin with no flesh behind it.
+    std::vector<std::pair<int, Eigen::Vector3d>> bones;  ///< frames and places along their bones.
   };
   struct Corners {
     std::array<Eigen::Vector3d, 3> points;
@@ -71,13 +77,16 @@ class LimbMap {
 
   LimbPiece piece_at(int frame, const Eigen::Vector3d& p) const;
   void add(Label& label, int frame, const Eigen::Vector3d& p) const;
-  void add_triangle(Label& label, const std::array<int, 3>& frames, const Eigen::Vector3d& p) const;
+  void add_triangle(Label& label, int triangle, const Eigen::Vector3d& p) const;
+  void add_bone(Label& label, int bone, const Eigen::Vector3d& p) const;
   void label_skin(std::vector<Label>& labels, const std::vector<CellFace>& faces) const;
   void label_bones(std::vector<Label>& labels) const;
   void mirror(std::vector<Label>& labels) const;
   LimbPiece image(const LimbPiece& piece) const;
   std::optional<Limb> own_flesh_at(const Eigen::Vector3d& p) const;
-  std::vector<Limb> gather(const Label& label, double edge) const;
+  double edge_at(std::span<const int> vertices) const;
+  void join_flesh(Label& label, const Cell& cell) const;
+  std::vector<Limb> gather(const Label& label) const;
 
   const RigInput& input_;
   const ReducedSkeleton& skeleton_;
@@ -86,7 +95,9 @@ class LimbMap {
   double h_;                                ///< unit coordinates.
   std::vector<int> frame_of_joint_;         ///< with the soft frames of the skeleton.
   std::vector<std::vector<int>> bones_of_;  ///< per joint: those its weight counts for.
-  std::vector<int> frame_of_vertex_;        ///< of the welded skin.
+  std::vector<std::array<int, 3>> frames_;  ///< of the corners of the welded skin's triangles.
+  std::vector<bool> is_sheet_;              ///< per welded vertex: no flesh is behind it.
+  TriangleGrid grid_;                       ///< the skin's triangles.
   std::vector<std::vector<Limb>> limbs_;
 };
 

@@ -98,7 +98,8 @@ RigInput make_rig_input(const Surface& skin, const JointTree& joints, const Buil
     weights = joint_weights(unit, unit_joints, stand_in);
   }
   weights.excluded = excluded;
-  CellSizes sizes = sizes_of_joints(unit, unit_joints, weights, stand_in, options);
+  CellSizes sizes = sizes_of_joints(unit, unit_joints, weights, stand_in, options,
+                                    search.found ? &search.mirror.joint : nullptr);
   std::vector<int> idle = idle_sizes(weights, options);
   RigInput input{skin,
                  joints,

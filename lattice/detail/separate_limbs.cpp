@@ -49,9 +49,8 @@ class Separation {
   bool is_single(int cell) const { return first_[cell + 1] - first_[cell] == 1; }
   std::vector<Limb> flesh_on(const CellFace& face) const;
   int owner(int cell, const Limb& flesh) const;
-  std::vector<std::vector<int>> parts_at(const std::vector<int>& star, const std::vector<int>& faces,
-                                         double edge) const;
-  bool is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones, double edge) const;
+  std::vector<std::vector<int>> parts_at(const std::vector<int>& star, const std::vector<int>& faces) const;
+  bool is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones) const;
   void split_vertices();
   void rebuild();
 
@@ -113,21 +112,20 @@ int Separation::owner(int cell, const Limb& flesh) const {
   return nearest;
 }
 
-/// Cells share a face where both are of one limb, or flesh passes through it; copies where they are of the
-/// same limb, or own the same flesh on the face.
+/// Cells share a face where both hold flesh of one frame, or flesh passes through it; copies where they hold
+/// flesh of one frame, or own the same flesh on the face.
 int Separation::link(const CellFace& face) {
   if (face.second < 0) return kSimple;
-  const double edge = limbs_.edge_at(face.vertices);
   const bool are_single = is_single(face.first) && is_single(face.second);
   if (are_single) {
     const Limb &a = instances_[first_[face.first]].limb, &b = instances_[first_[face.second]].limb;
-    if (a.empty() || b.empty() || limbs_.are_together(a, b, edge) || !flesh_on(face).empty()) return kSimple;
+    if (a.empty() || b.empty() || LimbMap::share_frame(a, b) || !flesh_on(face).empty()) return kSimple;
   }
   std::set<std::array<int, 2>> links;
   if (!are_single) {
     for (int i = first_[face.first]; i < first_[face.first + 1]; ++i)
       for (int k = first_[face.second]; k < first_[face.second + 1]; ++k)
-        if (limbs_.are_together(instances_[i].limb, instances_[k].limb, edge)) links.insert({i, k});
+        if (LimbMap::share_frame(instances_[i].limb, instances_[k].limb)) links.insert({i, k});
     for (const Limb& flesh : flesh_on(face)) {
       links.insert({owner(face.first, flesh), owner(face.second, flesh)});
     }
@@ -140,7 +138,7 @@ int Separation::link(const CellFace& face) {
 
 /// The instances round a vertex in groups that hang together through faces or belong to one limb.
 std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
-                                                   const std::vector<int>& faces, double edge) const {
+                                                   const std::vector<int>& faces) const {
   std::vector<int> members;
   for (int c : star)
     for (int i = first_[c]; i < first_[c + 1]; ++i) members.push_back(i);
@@ -170,7 +168,7 @@ std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
   for (int i = 0; i < n; ++i)
     for (int k = i + 1; k < n; ++k)
       if (root(i) != root(k) &&
-          limbs_.are_together(instances_[members[i]].limb, instances_[members[k]].limb, edge))
+          LimbMap::share_frame(instances_[members[i]].limb, instances_[members[k]].limb))
         join(i, k);
   std::vector<std::vector<int>> parts;
   std::vector<int> part_of(members.size(), -1);
@@ -185,10 +183,10 @@ std::vector<std::vector<int>> Separation::parts_at(const std::vector<int>& star,
   return parts;
 }
 
-bool Separation::is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones, double edge) const {
+bool Separation::is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones) const {
   return std::any_of(part.begin(), part.end(), [&](int i) {
     return std::any_of(bones.begin(), bones.end(),
-                       [&](const Limb& bone) { return limbs_.are_together(instances_[i].limb, bone, edge); });
+                       [&](const Limb& bone) { return LimbMap::share_frame(instances_[i].limb, bone); });
   });
 }
 
@@ -211,11 +209,10 @@ void Separation::split_vertices() {
   for (int v = 0; v < count; ++v) {
     if (!is_touched_[v]) continue;
     input_.poll();
-    const double edge = limbs_.edge_at({&v, 1});
-    const std::vector<std::vector<int>> parts = parts_at(stars[v], faces_at[v], edge);
+    const std::vector<std::vector<int>> parts = parts_at(stars[v], faces_at[v]);
     // The vertex stays with every part of its bones' limbs; off the bones with the first part.
     std::vector<bool> stays(parts.size(), false);
-    for (std::size_t p = 0; p < parts.size(); ++p) stays[p] = is_of_bone(parts[p], bones_at[v], edge);
+    for (std::size_t p = 0; p < parts.size(); ++p) stays[p] = is_of_bone(parts[p], bones_at[v]);
     if (std::find(stays.begin(), stays.end(), true) == stays.end()) stays[0] = true;
     for (std::size_t p = 0; p < parts.size(); ++p) {
       if (stays[p]) continue;

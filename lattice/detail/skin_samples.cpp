@@ -36,7 +36,7 @@ void sample_inside(const UnitSkin& skin, double h, const CellSizes& sizes, const
       poll();
       for (int k = 0; k < count.z(); ++k) {
         const Vector3d p = first + voxel * Vector3d(i, j, k);
-        if (sizes.is_uniform()) {
+        if (sizes.is_uniform(h)) {
           if (skin.is_inside(p)) out.push_back(p);
           continue;
         }

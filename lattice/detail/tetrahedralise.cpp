@@ -75,7 +75,7 @@ void relax(LatticePoints& points, const Triangulation& triangulation, double h, 
     const LatticePoints::Place& place = points.places[i];
     if (place.fixed || place.bone >= 0) continue;
     // Far from the bones a grid of one size is regular as it is.
-    if (options.is_uniform() && clearance.distance(points.points[i]) > kRelaxReach * h) continue;
+    if (options.is_uniform(h) && clearance.distance(points.points[i]) > kRelaxReach * h) continue;
     const bool in_plane = points.is_in_plane(static_cast<int>(i));
     neighbours.clear();
     delaunay.adjacent_vertices(triangulation.handles[i], std::back_inserter(neighbours));

@@ -82,11 +82,10 @@ bool TriangleGrid::crosses(const TriangleCorners& t, double eps) const {
   return !for_each_crossing(t, eps, [](int) { return false; });
 }
 
-bool TriangleGrid::for_each_crossing(const TriangleCorners& t, double eps,
-                                     const std::function<bool(int)>& visit) const {
+template <class Visit>
+bool TriangleGrid::visit_near(const Vector3d& low, const Vector3d& high, const Visit& visit) const {
   ++question_;
-  const Box box = box_of(t);
-  const Eigen::Vector3i first = cell_of(box.low), last = cell_of(box.high);
+  const Eigen::Vector3i first = cell_of(low), last = cell_of(high);
   for (int i = first.x(); i <= last.x(); ++i)
     for (int j = first.y(); j <= last.y(); ++j)
       for (int k = first.z(); k <= last.z(); ++k)
@@ -94,11 +93,37 @@ bool TriangleGrid::for_each_crossing(const TriangleCorners& t, double eps,
           if (seen_[n] == question_) continue;
           seen_[n] = question_;
           const Box other = box_of(triangles_[n]);
-          if ((other.low.array() > box.high.array()).any() || (other.high.array() < box.low.array()).any())
-            continue;
-          if (triangles_cross(t, triangles_[n], eps) && !visit(n)) return false;
+          if ((other.low.array() > high.array()).any() || (other.high.array() < low.array()).any()) continue;
+          if (!visit(n)) return false;
         }
   return true;
+}
+
+bool TriangleGrid::for_each_crossing(const TriangleCorners& t, double eps,
+                                     const std::function<bool(int)>& visit) const {
+  const Box box = box_of(t);
+  return visit_near(box.low, box.high,
+                    [&](int n) { return !triangles_cross(t, triangles_[n], eps) || visit(n); });
+}
+
+std::vector<double> TriangleGrid::crossings(const Vector3d& p, const Vector3d& q) const {
+  std::vector<double> found;
+  visit_near(p.cwiseMin(q), p.cwiseMax(q), [&](int n) {
+    const TriangleCorners& t = triangles_[n];
+    const Vector3d normal = (t[1] - t[0]).cross(t[2] - t[0]);
+    const double dp = normal.dot(p - t[0]), dq = normal.dot(q - t[0]);
+    if ((dp > 0.0) == (dq > 0.0)) return true;
+    const double s = dp / (dp - dq);
+    const Vector3d x = p + s * (q - p);
+    // The border belongs to the triangle, with a little more for rounding: no gap between two.
+    const double slack = -1e-9 * normal.squaredNorm();
+    for (int k = 0; k < 3; ++k)
+      if (normal.dot((t[(k + 1) % 3] - t[k]).cross(x - t[k])) < slack) return true;
+    found.push_back(s);
+    return true;
+  });
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 }  // namespace sinew::lattice::detail

@@ -26,7 +26,14 @@ class TriangleGrid {
   /// returned true.
   bool for_each_crossing(const TriangleCorners& t, double eps, const std::function<bool(int)>& visit) const;
 
+  /// Where the segment from p to q passes through triangles, as shares of its length in (0, 1), ascending;
+  /// twice where it passes through the edge of two.
+  std::vector<double> crossings(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const;
+
  private:
+  /// Calls visit(index) for every triangle whose box meets the box from low to high until it returns false.
+  template <class Visit>
+  bool visit_near(const Eigen::Vector3d& low, const Eigen::Vector3d& high, const Visit& visit) const;
   Eigen::Vector3i cell_of(const Eigen::Vector3d& p) const;
 
   std::vector<TriangleCorners> triangles_;

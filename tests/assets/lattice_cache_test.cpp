@@ -119,6 +119,7 @@ TEST_F(LatticeCache, MissesWhenAnythingThatMadeTheLatticeChanges) {
   expect_other([](auto&, auto&, auto& options) { options.cells = 61; });
   expect_other([](auto&, auto&, auto& options) { options.cell_size = 0.1; });
   expect_other([](auto&, auto&, auto& options) { options.size_factors = {{1, 0.5}}; });
+  expect_other([](auto&, auto&, auto& options) { options.grade = lattice::Grade::Off; });
   expect_other([](auto&, auto&, auto& options) { options.coarsen_rigid = lattice::CoarsenRigid::On; });
   expect_other([](auto&, auto&, auto& options) { options.include = {0}; });
   expect_other([](auto&, auto&, auto& options) { options.exclude = {0}; });

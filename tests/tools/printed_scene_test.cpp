@@ -42,6 +42,7 @@ Scene random_scene(std::mt19937_64& rng) {
   scene.tip_bones = index(2) == 1 ? Switch::On : Switch::Off;
   scene.symmetry = index(2) == 1 ? Switch::On : Switch::Off;
   if (built && index(2) == 1) scene.coarsen_rigid = Switch::On;
+  if (built && index(2) == 1) scene.grade = Switch::Off;
   if (built && index(2) == 1) scene.sizes = {{{text(), "a*"}, 0.25 + 3.75 * unit()}, {{"b"}, 1.0}};
   if (index(2) == 1) scene.guard = Switch::Off;
   if (index(2) == 1)

@@ -117,6 +117,7 @@ clip = "walk"
 cells = 500
 tip_bones = "off"
 symmetry = "off"
+grade = "off"
 coarsen_rigid = "on"
 guard = "off"
 preview = "off"
@@ -178,6 +179,7 @@ region = "trunk"
   expected.cells = 500;
   expected.tip_bones = expected.symmetry = expected.preview = Switch::Off;
   expected.guard = Switch::Off;
+  expected.grade = Switch::Off;
   expected.coarsen_rigid = Switch::On;
   expected.sizes = {{{"belly", "hip*"}, 0.5}};
   expected.part_roles = {{"body/head*", assets::PartRole::Riding}, {"hair", assets::PartRole::Simulated}};
