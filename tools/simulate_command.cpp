@@ -165,8 +165,8 @@ void say_what_runs(const Scene& scene, const Character& c, const FrameRange& fra
   for (const std::string& warning : outside_envelope(scene)) talk("warning: " + warning);
 }
 
-void say_settling(const Scene& scene, const fem::SimulationReport& settled, const fem::Body& body,
-                  const Talk& talk) {
+void say_settling(const Scene& scene, const Character& character, const fem::SimulationReport& settled,
+                  const fem::Body& body, const Talk& talk) {
   if (settled.settled) {
     if (settled.steps > 0)
       talk(fmt::format("settled in {} steps; fastest flesh left {:.2g} mm/s", settled.steps,
@@ -177,26 +177,16 @@ void say_settling(const Scene& scene, const fem::SimulationReport& settled, cons
   const char* remedy = scene.model == "blended"
                            ? "--model blended-stiffness, whose steps feed no motion"
                            : "a longer --settle, stiffer flesh (--young) or more --damping";
-  talk(fmt::format(
-      "warning: not settled: the flesh of '{}' still moves at {:.3g} m/s after {} steps, where {:.2g} "
+  const std::string line = fmt::format(
+      "not settled: the flesh of '{}' still moves at {:.3g} m/s after {} steps, where {:.2g} "
       "is rest; hint: {}",
-      settled.fastest, settled.speed, settled.steps, fem::kSettledRate * body.size, remedy));
+      settled.fastest, settled.speed, settled.steps, fem::kSettledRate * body.size, remedy);
+  if (scene.strict) throw NumericalError(character.rig.file + ": " + line);
+  talk("warning: " + line);
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-/// Flesh that still moves when its time to settle is over brings that motion into the first frames.
-void check_settled(const Scene& scene, const Character& character, const fem::SimulationReport& settled,
-                   const Talk& talk) {
-  if (settled.steps == 0 || settled.speed < simulation_options(scene).settle_speed) return;
-  const std::string line = fmt::format(
-      "{}: the flesh did not settle in {:g} s: it still moves at {:.3g} m/s; hint: --settle {:g}, or stiffer "
-      "flesh by --young",
-      character.rig.file, scene.settle, settled.speed, std::max(10.0, 4.0 * scene.settle));
-  if (scene.strict) throw NumericalError(line);
-  talk("warning: " + line);
 }
 
 /// The files that stand beside the cache.
@@ -248,104 +238,80 @@ void say_what_was_mended(const Character& character, const std::vector<FrameRepo
                   ->mended.area,
       100.0 * most->mended.largest / character.rig.height, most->frame,
       joint < 0 ? std::string("the body") : character.input.joints.names[static_cast<std::size_t>(joint)]));
-  /// The judge of a run's frames, and the time it takes.
-  class Judge {
-   public:
-    Judge(const Scene& scene, const Character& character, const FrameRange& frames) {
-      if (scene.plain) return;
-      std::vector<double> times;
-      for (int number = frames.first; number <= frames.last; ++number)
-        times.push_back(character.the_clip().start + number / scene.fps);
-      const auto start = std::chrono::steady_clock::now();
-      judge_ = make_skin_judge(character, times);
-      seconds_ += seconds_since(start);
-    }
+}
 
-    std::optional<fem::SkinFrame> measure(const CharacterFrame& frame, fem::FrameKind kind) {
-      if (!judge_) return std::nullopt;
-      const auto start = std::chrono::steady_clock::now();
-      const fem::SkinFrame skin = judge_->measure(frame.simulated, frame.skinned, kind);
-      seconds_ += seconds_since(start);
-      return skin;
-    }
-
-    double seconds() const { return seconds_; }
-
-   private:
-    std::optional<fem::SkinJudge> judge_;
-    double seconds_ = 0.0;
-  };
-
-  /// The verdict on the frames of the report.
-  void find_fault(const Scene& scene, const Character& character, const fem::Body& body, RunReport& report) {
-    std::vector<fem::SkinFrame> skins;
-    std::vector<int> numbers;
-    for (const FrameReport& frame : report.frames) {
-      if (!frame.skin) return;
-      skins.push_back(*frame.skin);
-      numbers.push_back(frame.frame);
-    }
-    report.finding = find_fault(scene, character, body, skins, numbers);
+/// The verdict on the frames of the report, which is thrown where it is strict and bad.
+void judge_frames(const Scene& scene, const Character& character, const fem::Body& body, RunReport& report) {
+  std::vector<fem::SkinFrame> skins;
+  std::vector<int> numbers;
+  for (const FrameReport& frame : report.frames) {
+    if (!frame.skin) return;
+    skins.push_back(*frame.skin);
+    numbers.push_back(frame.frame);
   }
+  report.finding = find_fault(scene, character, body, skins, numbers);
+  if (scene.strict) refuse_torn(*report.finding);
+}
 
-  /// Steps through the frames, writes the cache and keeps what the preview shows.
-  std::vector<assets::PreviewFrame> run_frames(
-      const Scene& scene, const Character& character, const fem::Body& body, fem::Simulation& simulation,
-      const FrameRange& frames, const OutputLayout& layout, const std::string& cache, RunReport& report) {
-    const double t0 = character.the_clip().start;
-    const int count = frames.last - frames.first + 1;
-    const std::vector<int> shown = assets::preview_frames(count);
-    std::vector<assets::PreviewFrame> preview;
-    Judge judge(scene, character, frames);
-    assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
-    const FrameGuard guard(scene, character);
-    const assets::PropMotion props(character.rig);
-    Progress progress("simulating", count);
-    for (int k = 0; k < count; ++k) {
-      const int number = frames.first + k;
-      const double time = t0 + number / scene.fps;
-      const fem::SimulationReport step = simulation.advance_to(time);
-      if (step.status != fem::SimulationStatus::Ok) fail(character, step, fmt::format("frame {}", number));
-      const std::vector<Eigen::Affine3d> pose = character.pose(time);
-      const Points surface = simulation.skin_of(simulation.positions_at(time));
-      CharacterFrame frame = frame_at(character, pose, surface);
-      if (scene.offset) offset_from_skinning(character, body, pose, time, *scene.offset, frame);
-      const fem::Mended mended = guard.mend(frame.skinned, frame.simulated);
-      props.place(pose, frame.skinned, frame.simulated);
-      try {
-        writer.write(layout.apply(frame.simulated));
-      } catch (const std::domain_error& error) {
-        throw NumericalError(
-            fmt::format("{}: frame {} at {:.6g} s: {}", character.rig.file, number, time, error.what()));
-      }
-      FrameReport f;
-      f.frame = number;
-      f.time = time;
-      f.steps = step.steps;
-      f.measures = simulation.measures_at(time);
-      f.mended = mended;
-      f.flipped_triangles = count_flipped_triangles(body, character.input.skin.surface, surface, pose);
-      f.skin = judge.measure(frame, k == 0 ? fem::FrameKind::First : fem::FrameKind::Later);
-      report.frames.push_back(f);
-      if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
-        preview.push_back(
-            {number, time, frame.simulated, frame.skinned, posed_bones(character.lattice.lattice, pose)});
-      }
-      progress.update(k + 1);
+/// Steps through the frames, writes the cache and keeps what the preview shows.
+std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character& character,
+                                             const fem::Body& body, fem::Simulation& simulation,
+                                             const FrameRange& frames, const OutputLayout& layout,
+                                             const std::string& cache, RunReport& report) {
+  const double t0 = character.the_clip().start;
+  const int count = frames.last - frames.first + 1;
+  const std::vector<int> shown = assets::preview_frames(count);
+  std::vector<assets::PreviewFrame> preview;
+  FrameJudge judge(scene, character, frames);
+  assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
+  const FrameGuard guard(scene, character);
+  const assets::PropMotion props(character.rig);
+  Progress progress("simulating", count);
+  for (int k = 0; k < count; ++k) {
+    const int number = frames.first + k;
+    const double time = t0 + number / scene.fps;
+    const fem::SimulationReport step = simulation.advance_to(time);
+    if (step.status != fem::SimulationStatus::Ok) fail(character, step, fmt::format("frame {}", number));
+    const std::vector<Eigen::Affine3d> pose = character.pose(time);
+    const Points surface = simulation.skin_of(simulation.positions_at(time));
+    CharacterFrame frame = frame_at(character, pose, surface);
+    if (scene.offset) offset_from_skinning(character, body, pose, time, *scene.offset, frame);
+    const fem::Mended mended = guard.mend(frame.skinned, frame.simulated);
+    props.place(pose, frame.skinned, frame.simulated);
+    try {
+      writer.write(layout.apply(frame.simulated));
+    } catch (const std::domain_error& error) {
+      throw NumericalError(
+          fmt::format("{}: frame {} at {:.6g} s: {}", character.rig.file, number, time, error.what()));
     }
-    writer.finish();
-    report.judging = judge.seconds();
-    return preview;
+    FrameReport f;
+    f.frame = number;
+    f.time = time;
+    f.steps = step.steps;
+    f.measures = simulation.measures_at(time);
+    f.mended = mended;
+    f.skin =
+        judge.measure(frame.simulated, frame.skinned, k == 0 ? fem::FrameKind::First : fem::FrameKind::Later);
+    report.frames.push_back(f);
+    if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
+      preview.push_back(
+          {number, time, frame.simulated, frame.skinned, posed_bones(character.lattice.lattice, pose)});
+    }
+    progress.update(k + 1);
   }
+  writer.finish();
+  report.judging = judge.seconds();
+  return preview;
+}
 
-  void write_picture(const Character& character, const std::vector<assets::PreviewFrame>& frames,
-                     const std::string& file) {
-    assets::PreviewOptions picture;
-    picture.caption =
-        std::filesystem::path(character.rig.file).stem().string() + ", " + character.the_clip().name;
-    picture.colours = assets::role_colours(character.rig);
-    assets::write_preview(file, all_triangles(character.rig), frames, picture);
-  }
+void write_picture(const Character& character, const std::vector<assets::PreviewFrame>& frames,
+                   const std::string& file) {
+  assets::PreviewOptions picture;
+  picture.caption =
+      std::filesystem::path(character.rig.file).stem().string() + ", " + character.the_clip().name;
+  picture.colours = assets::role_colours(character.rig);
+  assets::write_preview(file, all_triangles(character.rig), frames, picture);
+}
 
 }  // namespace
 
@@ -394,21 +360,14 @@ void simulate(const Scene& scene, const Talk& talk) {
   report.settle_speed = settled.speed;
   report.settle_joint = settled.fastest;
   report.settled = settled.settled;
-  say_settling(scene, settled, body, talk);
-  const auto preview =
-      run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
-  lap("simulate and write frames");
-  say_what_was_mended(character, report.frames, talk);
-  check_settled(scene, character, settled, talk);
-  talk(
-      fmt::format("settled in {} steps; fastest flesh left {:.2g} mm/s", settled.steps, 1e3 * settled.speed));
+  say_settling(scene, character, settled, body, talk);
   const auto preview =
       run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
   lap("simulate and write frames");
   report.times.back().second -= report.judging;
   report.times.emplace_back(kJudging, report.judging);
-  find_fault(scene, character, body, report);
-  if (report.finding && scene.strict) refuse_torn(*report.finding);
+  judge_frames(scene, character, body, report);
+  say_what_was_mended(character, report.frames, talk);
   if (scene.preview == Switch::On) write_picture(character, preview, out.file(kPicture));
   lap("preview");
   report.counts = simulation.counts();

@@ -1,6 +1,7 @@
 #include "tools/skin_report.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -15,6 +16,10 @@ namespace {
 
 using fem::SkinFault;
 using fem::SkinVerdict;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 /// How many cells the limb at a vertex is thick.
 double cells_across(const Character& c, const fem::Body& body, int vertex) {
@@ -98,6 +103,26 @@ std::optional<fem::SkinJudge> make_skin_judge(const Character& c, const std::vec
     plain.push_back(assets::skin(c.rig, c.pose(times[k])));
   const lattice::Points rest = rest_points(c.rig);
   return fem::SkinJudge({rest, all_triangles(c.rig), flesh, plain, c.rig.height});
+}
+
+// A plain scene has no skinning of an artist's to be judged by.
+FrameJudge::FrameJudge(const Scene& scene, const Character& character, const FrameRange& frames) {
+  if (scene.plain) return;
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<double> times;
+  for (int number = frames.first; number <= frames.last; ++number)
+    times.push_back(character.the_clip().start + number / scene.fps);
+  judge_ = make_skin_judge(character, times);
+  seconds_ = seconds_since(start);
+}
+
+std::optional<fem::SkinFrame> FrameJudge::measure(const lattice::Points& flesh, const lattice::Points& plain,
+                                                  fem::FrameKind kind) {
+  if (!judge_) return std::nullopt;
+  const auto start = std::chrono::steady_clock::now();
+  const fem::SkinFrame frame = judge_->measure(flesh, plain, kind);
+  seconds_ += seconds_since(start);
+  return frame;
 }
 
 SkinFinding find_fault(const Scene& scene, const Character& c, const fem::Body& body,

@@ -11,8 +11,23 @@
 namespace sinew::tools {
 
 /// The judge of a character's whole skin, in the order of whole_skin.h; `times` [s]: of the frames, any of
-/// the clip. Nothing for a plain scene, whose box has no skinning of an artist's to be judged by.
+/// the clip, at least one. Nothing where the character has no height or no clip.
 std::optional<fem::SkinJudge> make_skin_judge(const Character& character, const std::vector<double>& times);
+
+/// Judges the frames of a run, and knows how long that takes.
+class FrameJudge {
+ public:
+  FrameJudge(const Scene& scene, const Character& character, const FrameRange& frames);
+
+  /// Whole skins as whole_skin.h has them. Nothing for a plain scene.
+  std::optional<fem::SkinFrame> measure(const lattice::Points& flesh, const lattice::Points& plain,
+                                        fem::FrameKind kind);
+  double seconds() const { return seconds_; }
+
+ private:
+  std::optional<fem::SkinJudge> judge_;
+  double seconds_ = 0.0;
+};
 
 /// The verdict on a run or a pose.
 struct SkinFinding {

@@ -207,11 +207,11 @@ TEST_F(Simulate, SaysWhatDidNotSettleAndRefusesItWhenStrict) {
                               quoted(out("run"));
   const Outcome warned = run(command_line(command));
   EXPECT_EQ(warned.exit_code, 0) << warned.text;
-  EXPECT_NE(warned.text.find("did not settle"), std::string::npos) << warned.text;
+  EXPECT_NE(warned.text.find("not settled: the flesh of"), std::string::npos) << warned.text;
   fs::remove_all(out("run"));
   const Outcome refused = run(command_line(command + " --strict"));
   EXPECT_EQ(refused.exit_code, 4) << refused.text;
-  EXPECT_NE(refused.text.find("did not settle"), std::string::npos) << refused.text;
+  EXPECT_NE(refused.text.find("not settled: the flesh of"), std::string::npos) << refused.text;
   EXPECT_FALSE(fs::exists(out("run")));
 }
 
