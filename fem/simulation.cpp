@@ -224,7 +224,14 @@ Simulation::Beginning Simulation::beginning() const {
     place_bones(body_, posed, x);
     return x;
   };
-  const Points x1 = at(1), x2 = at(2), x3 = at(3);
+  Points x1, x2, x3;
+  try {
+    x1 = at(1);
+    x2 = at(2);
+    x3 = at(3);
+  } catch (const std::invalid_argument&) {
+    return begin;  // a clip that soon hides the body ends before that, and has no time to show accelerations
+  }
   const double rounding = kRounding * (body_.size + state_.x.cwiseAbs().maxCoeff());
   for (Eigen::Index a = 0; a < x1.rows(); ++a) {
     const Eigen::RowVector3d first = state_.x.row(a) - 2.0 * x1.row(a) + x2.row(a);
@@ -233,9 +240,10 @@ Simulation::Beginning Simulation::beginning() const {
     const double lasts = first.dot(second) / std::max(first.squaredNorm(), second.squaredNorm());
     // Of the cubic through the four places, but for what the first stage, whose bones go the mean of its
     // velocities, would else take for a jolt.
-    const Eigen::RowVector3d acceleration = (2.0 * first - second) / (interval * interval);
+    const Eigen::RowVector3d change = lasts * (second - first);
+    const Eigen::RowVector3d acceleration = (first - change) / (interval * interval);
     const Eigen::RowVector3d tangent =
-        (x1.row(a) - state_.x.row(a) - first / 2.0 + (second - first) / 3.0) / interval -
+        (x1.row(a) - state_.x.row(a) - first / 2.0 + change / 3.0) / interval -
         0.5 * eta_h * acceleration;
     begin.acceleration.row(a) = lasts * acceleration;
     begin.velocity.row(a) += lasts * (tangent - begin.velocity.row(a));

@@ -259,6 +259,7 @@ TEST(Blended, RestsWhereARunSettles) {
   const tests::Arm arm = tests::make_arm();
   const Body body = tests::arm_body(arm, 90 * kDegree);
   SimulationOptions run;
+  run.model = "blended";
   run.integrator = Integrator::BackwardEuler;
   run.settle_limit = 20.0;
   run.settle_speed = 1e-10;

@@ -138,6 +138,7 @@ double transient_error(int levels, bool damped, Integrator integrator) {
   if (damped) options.damping = tests::rayleigh(0.5, 0.002);
   const Body body = tests::bar_body(options);
   SimulationOptions run;
+  run.model = "blended";
   run.integrator = integrator;
   run.gravity = {0.0, 0.0, -9.81};
   const Motion still = [](double) { return std::vector<Eigen::Affine3d>{Eigen::Affine3d::Identity()}; };
