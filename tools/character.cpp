@@ -93,7 +93,6 @@ fem::DefaultMaterials default_materials(const Scene& scene, const Character& c) 
   if (const auto mirror = lattice::find_mirror_map(c.lattice.lattice, c.input.skin.surface))
     input.partners = mirror->frames;
   input.size = (skin.colwise().maxCoeff() - skin.colwise().minCoeff()).maxCoeff();
-  input.fastest = 0.25 * scene.fps;
   input.density = scene.density;
   input.poisson = scene.poisson;
   input.gravity = scene.gravity.norm() > 0.0 ? scene.gravity.norm() : kEarth;
@@ -274,7 +273,9 @@ lattice::BuildOptions build_options(const Scene& scene, const std::vector<std::s
   options.exclude = joints_of(scene.bones_exclude, joints, "bones_exclude");
   options.tip_bones = scene.tip_bones == Switch::On ? lattice::TipBones::On : lattice::TipBones::Off;
   options.symmetry = scene.symmetry == Switch::On ? lattice::Symmetry::Auto : lattice::Symmetry::Off;
-  options.grade = scene.grade == Switch::On ? lattice::Grade::On : lattice::Grade::Off;
+  // Who asks for an edge gets that edge.
+  const bool graded = scene.grade == Switch::On && !scene.cell_size;
+  options.grade = graded ? lattice::Grade::On : lattice::Grade::Off;
   options.coarsen_rigid =
       scene.coarsen_rigid == Switch::On ? lattice::CoarsenRigid::On : lattice::CoarsenRigid::Off;
   std::map<int, double> factors;

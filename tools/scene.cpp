@@ -60,10 +60,9 @@ std::string print_role(std::string_view table, const RoleOf& of) {
 /// Keys that say something about a rig; a plain scene has none of them.
 bool is_of_characters(std::string_view key) {
   constexpr std::string_view kKeys[] = {
-      "rig",      "clip",  "lattice",       "lattice_space", "snap_tolerance", "soft_bones",
-      "cache",    "cells", "cell_size",     "bones_include", "bones_exclude",  "tip_bones",
-      "symmetry", "grade", "coarsen_rigid", "height",        "output_space",   "output_mesh",
-      "guard"};
+      "rig",           "clip",      "lattice",       "lattice_space", "snap_tolerance", "soft_bones", "cache",
+      "cells",         "cell_size", "bones_include", "bones_exclude", "tip_bones",      "symmetry",   "grade",
+      "coarsen_rigid", "height",    "output_space",  "output_mesh",   "guard"};
   return std::find(std::begin(kKeys), std::end(kKeys), key) != std::end(kKeys);
 }
 
@@ -144,7 +143,7 @@ void check_material(const Scene& scene, const BoneMaterial& material, const std:
                               ": regions of a lattice, expected no bones, radius, stiffness or region with "
                               "them; hint: two materials");
   if (scene.lattice.empty())
-    throw assets::ConfigError(where +
+    throw assets::ConfigError((scene.source.path.empty() ? "" : scene.source.path + ": ") + where +
                               ": regions, expected none as a lattice that is built has none; hint: bones, or "
                               "a lattice of your own");
 }

@@ -159,7 +159,7 @@ class LadderCommand : public tests::Simulate {
   std::string scene() const {
     const fs::path path = out("scene.toml");
     std::ofstream(path)
-        << "young = 5e4\nframes = \"0-3\"\nsettle = 0.1\n[lattice]\nbox = [1, 0.2, 0.2]\ncells = [4, 1, 1]\n"
+        << "young = 5e4\nframes = \"0-3\"\nsettle = 0\n[lattice]\nbox = [1, 0.2, 0.2]\ncells = [4, 1, 1]\n"
            "[[bone]]\nname = \"a\"\nstart = [0, 0, 0]\nend = [0.5, 0, 0]\n"
            "keys = [{ time = 0 }, { time = 0.1, angle = 20 }]\n";
     return tests::quoted(path);

@@ -20,7 +20,7 @@ PartOfRun part_of(const fs::path& folder, const std::string& name) {
   const nlohmann::json sidecar = nlohmann::json::parse(read(folder / "skin.json"));
   Eigen::Index first = 0, count = 0;
   for (const auto& part : sidecar["parts"]) {
-    count = part["vertices"].get<int>();
+    count = part["vertex_count"].get<int>();
     if (part["name"] == name) break;
     first += count;
   }

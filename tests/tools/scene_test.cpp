@@ -36,8 +36,9 @@ TEST_F(SceneFile, ReadsWhichBonesTakePartAndHowLargeCellsAre) {
 TEST_F(SceneFile, ReadsToWhichFramesTheCharacterIsCut) {
   EXPECT_EQ(read("cuts = [31, 60]").cuts, (std::vector<int>{31, 60}));
   EXPECT_TRUE(read("cuts = []").cuts.empty());
-  EXPECT_EQ(refusal("cuts = 31"),
-            "scene.toml:1: cuts: got an integer, expected an array of whole numbers, 1 <= frame <= 10000000");
+  EXPECT_EQ(
+      refusal("cuts = 31"),
+      "scene.toml:1: cuts: got a whole number, expected an array of whole numbers, 1 <= frame <= 10000000");
   EXPECT_EQ(refusal("cuts = [31, 1.5]"),
             "scene.toml:1: cuts: got a number, expected a whole number, 1 <= frame <= 10000000");
   EXPECT_EQ(refusal("cuts = [0]"), "scene.toml:1: cuts: got 0, expected 1 <= frame <= 10000000; hint: 31");
@@ -73,7 +74,7 @@ TEST_F(SceneFile, TakesRegionsOfALatticeByNameAndNumber) {
   other.lattice.clear();
   EXPECT_EQ(
       message(other),
-      "material 1: regions, expected none as a lattice that is built has none; hint: bones, or a lattice "
+      "scene.toml: material 1: regions, expected none as a lattice that is built has none; hint: bones, or a lattice "
       "of your own");
   EXPECT_EQ(refusal("[[material]]\nregions = 7"),
             "scene.toml:2: material 1: regions: got a whole number, expected an array of names or numbers of "
@@ -97,7 +98,7 @@ TEST_F(SceneFile, SaysWhatIsWrongWithRoles) {
             "scene.toml:1: part 1: no name, expected a name and a role; hint: name = \"sword*\", role = "
             "\"skinned\"");
   EXPECT_EQ(refusal("[[bone]]\nname = \"head\"\nrole = \"riding\"\nsoft = true"),
-            "scene.toml:4: soft: unknown key, expected one of name, role");
+            "scene.toml:4: soft: unknown key; hint: known are name, role");
   // Bones with places belong to a box.
   EXPECT_EQ(refusal("[[bone]]\nstart = [0, 0, 0]\nend = [1, 0, 0]"),
             "scene.toml: [lattice]: missing, expected a box; hint: bones, fixed faces, loads and velocities "
@@ -256,7 +257,7 @@ TEST_F(SceneFile, ReportsWhatIsWrongWithLineValueRangeAndRemedy) {
       {"model = \"blendde\"",
        "scene.toml:1: model: got 'blendde', expected one of " + model_list() + "; hint: blended"},
       {"model = \"magic\"",
-       "scene.toml:1: model: got 'magic', expected one of " + model_list() + "; hint: blended"},
+       "scene.toml:1: model: got 'magic', expected one of " + model_list() + "; hint: blended-stiffness"},
       {"clip = 3", "scene.toml:1: clip: got a whole number, expected a string"},
       {"overwrite = 1", "scene.toml:1: overwrite: got a whole number, expected true or false"},
       {"rig = \"a.glb\"\ndampnig = 0.1", "scene.toml:2: dampnig: unknown key; hint: did you mean damping?"},

@@ -51,12 +51,12 @@ TEST_F(Steering, TakesTheEdgeOfTheCellsInsteadOfTheirNumber) {
 TEST_F(Steering, SizesCellsBoneByBone) {
   std::ofstream(out("sized.toml"))
       << "rig = \"" << SINEW_SOURCE_DIR "/assets/samples/hopper.glb"
-      << "\"\noutput = \"run\"\ncells = 300\n[[size]]\nbones = [\"tail*\"]\nfactor = 0.5\n";
+      << "\"\noutput = \"run\"\ncells = 300\ngrade = \"off\"\n[[size]]\nbones = [\"tail*\"]\nfactor = 0.5\n";
   const auto lattice_of = [&](const std::string& input, const std::string& name) {
     const fs::path json = out(name + ".json");
-    const tests::Outcome run = tests::run_line(
-        tests::command_line("lattice " + tests::quoted(input) + " --cells 300 --json --preview off -o " +
-                            tests::quoted(out(name)) + " > " + tests::quoted(json) + " 2>/dev/null"));
+    const tests::Outcome run = tests::run_line(tests::command_line(
+        "lattice " + tests::quoted(input) + " --cells 300 --grade off --json --preview off -o " +
+        tests::quoted(out(name)) + " > " + tests::quoted(json) + " 2>/dev/null"));
     EXPECT_EQ(run.exit_code, 0) << run.text;
     return nlohmann::json::parse(tests::read(json));
   };
