@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 
 #include <Eigen/SVD>
 
@@ -276,6 +277,18 @@ PropMotion::PropMotion(const Rig& rig) : rig_(rig), rest_(detail::rest_points(ri
   }
 }
 
+namespace {
+
+/// A turn less the first few degrees of it: eyes look where the artist has them look while the flesh round
+/// them ripples, and a hat goes with a head that swings.
+Matrix3d beyond_gaze(const Matrix3d& turn) {
+  constexpr double kGaze = 5.0 * std::numbers::pi / 180.0;
+  const Eigen::AngleAxisd whole(turn);
+  return Eigen::AngleAxisd(std::max(0.0, whole.angle() - kGaze), whole.axis()).toRotationMatrix();
+}
+
+}  // namespace
+
 void PropMotion::place(const std::vector<Eigen::Affine3d>& pose_from_rest, const Points& skinned,
                        Points& frame) const {
   std::map<int, Matrix3d> turn_of;
@@ -291,7 +304,7 @@ void PropMotion::place(const std::vector<Eigen::Affine3d>& pose_from_rest, const
       motion.translation() = joint * origin - motion.linear() * origin;
       source = &rest_;
     } else if (prop.role == PartRole::Riding) {
-      motion.linear() = turn_of[joint_of_prop_[i]];
+      motion.linear() = beyond_gaze(turn_of[joint_of_prop_[i]]);
       motion.translation() =
           middle_of(prop.anchors, frame) - motion.linear() * middle_of(prop.anchors, skinned);
     }

@@ -36,7 +36,8 @@ Eigen::Matrix3d best_turn(const std::vector<Anchor>& anchors, const lattice::Poi
 /// Skinned props get the rig's own skinning. Rigid ones turn as their joint does and take neither scale nor
 /// shear. Riding ones are skinned, then moved as flesh was moved away from its skinning: turned as all that
 /// hangs on the joint of their anchors did, so that both eyes of a head look the same way whatever ripples
-/// past one of them, and carried to where their anchors went.
+/// past one of them, less the first 5 degrees, so that gaze is the artist's, and carried to where their
+/// anchors went.
 class PropMotion {
  public:
   /// The rig must outlive it.

@@ -34,8 +34,8 @@ double default_young(const FleshLoad& load);
 
 /// What flesh of a character of that size swings at [Hz]: 7 Hz at 1.8 m, like the root of its size, so that
 /// large things move slowly; at most `fastest` (a quarter of the usual 30
-/// frames per second: faster swings flicker; not of the rate asked for, as flesh does not depend on how often one
-/// looks).
+/// frames per second: faster swings flicker; not of the rate asked for, as flesh does not depend on how often
+/// one looks).
 double default_frequency(double size, double fastest);
 
 /// What default materials are made for. No lattice: the same rig has the same flesh in any.

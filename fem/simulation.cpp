@@ -243,8 +243,7 @@ Simulation::Beginning Simulation::beginning() const {
     const Eigen::RowVector3d change = lasts * (second - first);
     const Eigen::RowVector3d acceleration = (first - change) / (interval * interval);
     const Eigen::RowVector3d tangent =
-        (x1.row(a) - state_.x.row(a) - first / 2.0 + change / 3.0) / interval -
-        0.5 * eta_h * acceleration;
+        (x1.row(a) - state_.x.row(a) - first / 2.0 + change / 3.0) / interval - 0.5 * eta_h * acceleration;
     begin.acceleration.row(a) = lasts * acceleration;
     begin.velocity.row(a) += lasts * (tangent - begin.velocity.row(a));
   }

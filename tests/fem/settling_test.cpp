@@ -128,14 +128,17 @@ TEST_P(Settling, TakesNothingForAnAccelerationThatDoesNotLast) {
 }
 
 TEST_P(Settling, SaysWhatDidNotSettle) {
-  if (GetParam() == std::string("blended-stiffness"))
-    GTEST_SKIP() << "stands still to the last digit at once";
   SimulationOptions impatient = options();
   impatient.settle_speed = 1e-30;  // m/s
   impatient.settle_limit = 3.5 * impatient.step;
   Simulation simulation(body_, moved([](double) { return Eigen::Vector3d::Zero(); }, 1.0), 0.0, impatient);
   const SimulationReport report = simulation.settle();
   EXPECT_EQ(report.status, SimulationStatus::Ok);
+  if (GetParam() == std::string("blended-stiffness")) {  // stands still to the last digit at once
+    EXPECT_TRUE(report.settled);
+    EXPECT_EQ(report.speed, 0.0);
+    return;
+  }
   EXPECT_FALSE(report.settled);
   EXPECT_EQ(report.steps, 4);
   EXPECT_GT(report.speed, 0.0);

@@ -134,7 +134,7 @@ TEST(SeparateLimbs, CopiesTogetherHoldTheFleshOfTheirPlaceOnce) {
         for (const CellCopy& copy : copies)
           sum += own[static_cast<std::size_t>(hierarchy.first_hex(copy.cell) + corner)][octant];
         // Sums of eight shares in another order.
-        EXPECT_NEAR(sum, all[static_cast<std::size_t>(hierarchy.first_hex(place) + corner)][octant], 1e-15);
+        EXPECT_NEAR(sum, all[static_cast<std::size_t>(hierarchy.first_hex(place) + corner)][octant], 1e-13);
         flesh += sum;
       }
   EXPECT_GT(flesh, 10.0) << "no flesh in shared cells";

@@ -72,10 +72,10 @@ TEST_F(SceneFile, TakesRegionsOfALatticeByNameAndNumber) {
       "two materials");
   other = scene;
   other.lattice.clear();
-  EXPECT_EQ(
-      message(other),
-      "scene.toml: material 1: regions, expected none as a lattice that is built has none; hint: bones, or a lattice "
-      "of your own");
+  EXPECT_EQ(message(other),
+            "scene.toml: material 1: regions, expected none as a lattice that is built has none; hint: "
+            "bones, or a lattice "
+            "of your own");
   EXPECT_EQ(refusal("[[material]]\nregions = 7"),
             "scene.toml:2: material 1: regions: got a whole number, expected an array of names or numbers of "
             "regions");
