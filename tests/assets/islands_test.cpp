@@ -286,6 +286,14 @@ TEST(Riding, AddsTheMotionOfTheFleshToTheSkinning) {
     Points frame = moved;
     for (const int v : eye.vertices) frame.row(v).setConstant(99.0);  // to be filled in
     PropMotion(rig).place(pose, skinned, frame);
+    if (role == PartRole::Riding) {  // turned as the flesh, but for the 5 degrees that gaze keeps
+      std::vector<Anchor> all;
+      for (const int v : eye.vertices) all.push_back({v, 1.0 / static_cast<double>(eye.vertices.size())});
+      const Eigen::AngleAxisd turned(best_turn(all, skinned, frame)), whole(motion.linear());
+      EXPECT_NEAR(turned.angle(), whole.angle() - 5.0 * M_PI / 180.0, 1e-7);
+      EXPECT_NEAR(turned.axis().dot(whole.axis()), 1.0, 1e-7);
+      continue;
+    }
     for (const int v : eye.vertices) {
       const Vector3d rest = rig.parts[3].points.row(v - eye.vertices.front()).transpose();
       Vector3d expected = moved.row(v).transpose();

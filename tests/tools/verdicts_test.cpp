@@ -41,6 +41,7 @@ TEST_P(Verdicts, AreNoWorseThanTheyWere) {
   ASSERT_TRUE(fs::exists(rig)) << rig << " is missing";
   const fs::path out = fs::path(SINEW_BINARY_DIR) / "verdicts_test" / (rig.filename().string() + row.clip);
   fs::remove_all(out);
+  fs::create_directories(out.parent_path());
   const std::string clip = row.clip == "-" ? "" : " --clip " + tests::quoted(row.clip);
   const Outcome outcome = run(command_line("simulate " + quoted(rig) + clip + " --frames " + row.frames +
                                            " --preview off --cache off -o " + quoted(out)));
