@@ -52,14 +52,15 @@ void expect_sized(const Sized& sized, const std::string& file) {
     return static_cast<int>(found - input.joints.names.begin());
   };
   std::vector<int> belly;
-  lattice::BuildOptions options;
+  lattice::BuildOptions options, alike;
+  options.grade = alike.grade = lattice::Grade::Off;  // what sizes do, not what limbs do
   for (const char* name : sized.belly) {
     belly.push_back(joint(name));
     options.size_factors.push_back({belly.back(), 0.5});
   }
   const std::vector<int> head{joint(sized.head)};
   options.size_factors.push_back({head[0], 2.0});
-  const lattice::BuildResult plain = lattice::build(input.skin.surface, input.joints, {}),
+  const lattice::BuildResult plain = lattice::build(input.skin.surface, input.joints, alike),
                              result = lattice::build(input.skin.surface, input.joints, options);
   for (const lattice::GateFailure& failure : result.failures) ADD_FAILURE() << failure.what;
   EXPECT_FALSE(result.lattice.is_grid);
