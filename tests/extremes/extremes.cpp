@@ -96,7 +96,9 @@ class HeldEnergy {
   double rise() const { return share(rise_); }
 
  private:
-  static double energy_of(const fem::Measures& m) { return m.kinetic + m.elastic + m.potential + m.ties; }
+  static double energy_of(const fem::Measures& m) {
+    return m.kinetic + m.elastic + m.potential + m.ties + m.ghost;
+  }
   double share(double energy) const { return energy > noise_ ? (energy - noise_) / scale_ : 0.0; }
 
   int count_ = 0;
@@ -166,7 +168,7 @@ Extreme run_extreme(Simulation& simulation, double step, int steps, double held_
     // Bones are exact to the last digits of where they are.
     const double extent = result.x.rowwise().norm().maxCoeff();
     EXPECT_LE(m.bone_residual, 1e-15 * extent) << "step " << k;
-    result.energy = m.kinetic + m.elastic + m.potential + m.ties;
+    result.energy = m.kinetic + m.elastic + m.potential + m.ties + m.ghost;
     result.elastic = std::max(result.elastic, m.elastic);
     result.inverted = m.inverted_cells;
     if (4 * k <= steps) result.early = std::max(result.early, m.kinetic);
