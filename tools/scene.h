@@ -170,8 +170,8 @@ struct Scene {
   std::vector<int> cuts;
   /// Longest time that the flesh may take to settle before the first frame [s]; 0 ... 3600.
   double settle = 5.0;
-  /// What is written is the rig's own skinning plus this share of (model - `skin`) [-]; 0 ... 10, 0 = plain
-  /// skinning. Unset: the model's flesh itself.
+  /// What is written is the rig's own skinning plus this share of (flesh - its rest in the pose) [-];
+  /// 0 ... 10, 0 = plain skinning. Unset: the model's flesh itself.
   std::optional<double> offset;
   /// Lay the skin back towards plain skinning where cells are too coarse to carry it (fem/skin_guard.h).
   Switch guard = Switch::On;

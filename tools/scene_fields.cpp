@@ -120,7 +120,7 @@ constexpr auto kFields = std::to_array<SceneField>({
      "5"},
     {"offset",
      &Scene::offset,
-     "write the rig's own skinning plus this share of (model - skin); left out: the flesh itself",
+     "the rig's own skinning plus this share of (flesh - its rest in the pose); left out: the flesh itself",
      "offset",
      {0.0, 10.0},
      "",

@@ -24,7 +24,6 @@
 #include "assets/riding.h"
 #include "assets/sidecar.h"
 #include "fem/envelope.h"
-#include "fem/placement.h"
 #include "lattice/limb_copies.h"
 #include "tools/body_fields.h"
 #include "tools/character.h"
@@ -32,6 +31,7 @@
 #include "tools/failure.h"
 #include "tools/frame_guard.h"
 #include "tools/interrupt.h"
+#include "tools/offset_flesh.h"
 #include "tools/plain_loads.h"
 #include "tools/progress.h"
 #include "tools/run_report.h"
@@ -111,20 +111,23 @@ CharacterFrame frame_at(const Character& character, const std::vector<Eigen::Aff
   return frame;
 }
 
-/// The flesh on top of the rig's own skinning: `share` times what tells it from the bottom rung, flesh that
-/// the bones alone deform.
-void offset_from_skinning(const Character& character, const fem::Body& body,
-                          const std::vector<Eigen::Affine3d>& pose, double time, double share,
-                          CharacterFrame& frame) {
-  const Points bottom =
-      body.skin_rows * fem::skinned_positions(body, fem::pose_frames(body.tree, pose, time));
-  const std::vector<int>& map = character.input.skin.surface_of_vertex;
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    if (map[i] < 0) continue;
-    const auto row = static_cast<Eigen::Index>(i);
-    frame.simulated.row(row) =
-        frame.skinned.row(row) + share * (frame.simulated.row(row) - bottom.row(map[i]));
+/// "frame 0: at most 2.1 % of the height from plain skinning, in 'body' at joint 'spine'".
+std::string distance_line(const assets::Rig& rig, const CharacterFrame& frame, int number) {
+  Eigen::Index vertex = 0;
+  const double distance = (frame.simulated - frame.skinned).rowwise().norm().maxCoeff(&vertex);
+  std::size_t p = 0;
+  for (; vertex >= rig.parts[p].points.rows(); ++p) vertex -= rig.parts[p].points.rows();
+  const assets::Part& part = rig.parts[p];
+  std::string place = fmt::format("in '{}'", part.name);
+  if (!part.weights.empty()) {
+    const auto& influences = part.weights[static_cast<std::size_t>(vertex)];
+    const auto most = std::max_element(influences.begin(), influences.end(),
+                                       [](const auto& a, const auto& b) { return a.weight < b.weight; });
+    if (most != influences.end())
+      place += fmt::format(" at joint '{}'", rig.skeleton.joint(most->frame).name);
   }
+  return fmt::format("frame {}: at most {:.2g} % of the height from plain skinning, {}", number,
+                     100.0 * distance / rig.height, place);
 }
 
 std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> posed_bones(
@@ -255,9 +258,10 @@ void judge_frames(const Scene& scene, const Character& character, const fem::Bod
 
 /// Steps through the frames, writes the cache and keeps what the preview shows.
 std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character& character,
-                                             const fem::Body& body, fem::Simulation& simulation,
-                                             const FrameRange& frames, const OutputLayout& layout,
-                                             const std::string& cache, RunReport& report) {
+                                             fem::Simulation& simulation,
+                                             const fem::SimulationOptions& options, const FrameRange& frames,
+                                             const OutputLayout& layout, const std::string& cache,
+                                             const Talk& talk, RunReport& report) {
   const double t0 = character.the_clip().start;
   const int count = frames.last - frames.first + 1;
   const std::vector<int> shown = assets::preview_frames(count);
@@ -266,6 +270,8 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
   assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
   const FrameGuard guard(scene, character);
   const assets::PropMotion props(character.rig);
+  std::optional<OffsetFlesh> offset;
+  if (scene.offset.value_or(0.0) != 0.0) offset.emplace(*scene.offset, character, simulation, options);
   Progress progress("simulating", count);
   for (int k = 0; k < count; ++k) {
     const int number = frames.first + k;
@@ -275,9 +281,14 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
     const std::vector<Eigen::Affine3d> pose = character.pose(time);
     const Points surface = simulation.skin_of(simulation.positions_at(time));
     CharacterFrame frame = frame_at(character, pose, surface);
-    if (scene.offset) offset_from_skinning(character, body, pose, time, *scene.offset, frame);
+    if (offset) {
+      offset->apply(time, pose, frame.skinned, frame.simulated);
+    } else if (scene.offset) {
+      frame.simulated = frame.skinned;
+    }
     const fem::Mended mended = guard.mend(frame.skinned, frame.simulated);
     props.place(pose, frame.skinned, frame.simulated);
+    if (k == 0) talk(distance_line(character.rig, frame, number));
     try {
       writer.write(layout.apply(frame.simulated));
     } catch (const std::domain_error& error) {
@@ -362,7 +373,7 @@ void simulate(const Scene& scene, const Talk& talk) {
   report.settled = settled.settled;
   say_settling(scene, character, settled, body, talk);
   const auto preview =
-      run_frames(scene, character, body, simulation, frames, layout, out.file("skin.pc2"), report);
+      run_frames(scene, character, simulation, options, frames, layout, out.file("skin.pc2"), talk, report);
   lap("simulate and write frames");
   report.times.back().second -= report.judging;
   report.times.emplace_back(kJudging, report.judging);

@@ -19,6 +19,7 @@
 #include "fem/models/balance.h"
 #include "fem/models/corotational_cells.h"
 #include "fem/models/free_system.h"
+#include "fem/models/near_rest.h"
 #include "fem/models/newton_solver.h"
 #include "fem/models/repeated_factor.h"
 #include "fem/placement.h"
@@ -46,7 +47,21 @@ class RememberedRotations {
   std::deque<std::pair<Points, Rotations>> last_;
 };
 
-class RotatedModel final : public Model {
+/// A Cholesky factor of an earlier system, to precondition by.
+struct EarlierFactor {
+  explicit EarlierFactor(Precision precision) : factor(precision) {}
+  RepeatedFactor factor;
+  double inertia = -1.0, damping = -1.0;
+  Rotations rotations;
+};
+
+/// When conjugate gradients have done enough.
+struct Enough {
+  double residual = 0.0;  ///< norm of what is left over [N].
+  double move = 0.0;      ///< or the largest move that the preconditioner still asks for [m]; 0: never.
+};
+
+class RotatedModel final : public Model, public NearRest {
  public:
   RotatedModel(std::string name, const Body& body, CellRotations rotations, const RotatedOptions& options)
       : name_(std::move(name)),
@@ -56,7 +71,8 @@ class RotatedModel final : public Model {
         cells_(body),
         free_(free_vertices(body)),
         system_(body, free_),
-        factor_(options_.precision) {}
+        stage_factor_(options_.precision),
+        rest_factor_(options_.precision) {}
   /// With polar rotations.
   RotatedModel(std::string name, const Body& body, const RotatedOptions& options)
       : RotatedModel(std::move(name), body, CellRotations(), options) {
@@ -83,6 +99,7 @@ class RotatedModel final : public Model {
   }
 
   SolveReport equilibrate(const PoseProblem& problem, Points& x) override;
+  SolveReport approach_rest(const PoseProblem& problem, double slack, Points& x) override;
 
   CellForces cell_forces(const Points& x, const PosedFrames& pose) override {
     if (polar_) return (*polar_)(x);
@@ -94,7 +111,8 @@ class RotatedModel final : public Model {
     counts.regions = 1;
     counts.functions = body_.mesh.num_functions();
     counts.unknowns = {free_.num_unknowns()};
-    counts.factor_nonzeros = factor_.num_nonzeros();
+    counts.factor_nonzeros =
+        std::max(stage_factor_.factor.num_nonzeros(), rest_factor_.factor.num_nonzeros());
     return counts;
   }
 
@@ -115,10 +133,10 @@ class RotatedModel final : public Model {
                      const Points& move);
   Points apply(const Balance& balance, const Rotations& rotations, const Points& dx);
   SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
-                      double enough, Points& move);
-  bool refactor(const Balance& balance, const Rotations& rotations, SolveReport& report);
-  std::vector<Eigen::Matrix3d> turns_since_factor(const Rotations& rotations) const;
-  void precondition(const std::vector<Eigen::Matrix3d>& turns, const Points& residual, Points& result) const;
+                      const Enough& enough, Points& move);
+  bool refactor(const Balance& balance, const Rotations& rotations, EarlierFactor& earlier,
+                SolveReport& report);
+  std::vector<Eigen::Matrix3d> turns_since(const EarlierFactor& earlier, const Rotations& rotations) const;
 
   std::string name_;
   const Body& body_;
@@ -136,9 +154,8 @@ class RotatedModel final : public Model {
   std::unique_ptr<CellEnergy> potential_;  ///< of polar rotations, made when it is first needed,
   std::optional<NewtonSolver> newton_;     ///< like its solver.
 
-  RepeatedFactor factor_;
-  double factor_inertia_ = -1.0, factor_damping_ = -1.0;
-  Rotations factor_rotations_;
+  // Apart, as whoever asks for both in turn would factor at every change.
+  EarlierFactor stage_factor_, rest_factor_;
 };
 
 std::vector<Rotations> RotatedModel::past_rotations(const Balance& balance) {
@@ -198,30 +215,32 @@ Points RotatedModel::apply(const Balance& balance, const Rotations& rotations, c
   return free_.gather(forces);
 }
 
-bool RotatedModel::refactor(const Balance& balance, const Rotations& rotations, SolveReport& report) {
+bool RotatedModel::refactor(const Balance& balance, const Rotations& rotations, EarlierFactor& earlier,
+                            SolveReport& report) {
   std::vector<CellStiffness> matrices(rotations.size());
   tbb::parallel_for(std::size_t{0}, matrices.size(), [&](std::size_t c) {
     matrices[c] = (1.0 + balance.damping) * cells_.rotated(static_cast<int>(c), rotations[c]);
   });
   system_.assemble({balance.inertia, 1.0, 1.0 + balance.damping}, matrices);
-  const Factor::Report factor = factor_.factorise(system_.lower());
+  const Factor::Report factor = earlier.factor.factorise(system_.lower());
   if (!factor.ok) {
     report.status = SolveStatus::NotPositiveDefinite;
     report.message = name_ + ": " + factor.message;
     return false;
   }
-  factor_inertia_ = balance.inertia;
-  factor_damping_ = balance.damping;
-  factor_rotations_ = rotations;
+  earlier.inertia = balance.inertia;
+  earlier.damping = balance.damping;
+  earlier.rotations = rotations;
   return true;
 }
 
 /// Mean rotation of the cells round every unknown since the factor was made.
-std::vector<Eigen::Matrix3d> RotatedModel::turns_since_factor(const Rotations& rotations) const {
+std::vector<Eigen::Matrix3d> RotatedModel::turns_since(const EarlierFactor& earlier,
+                                                       const Rotations& rotations) const {
   std::vector<Eigen::Vector4d> sums(static_cast<std::size_t>(body_.mesh.num_vertices()),
                                     Eigen::Vector4d::Zero());
   for (std::size_t c = 0; c < rotations.size(); ++c) {
-    const Eigen::Quaterniond turn(rotations[c] * factor_rotations_[c].transpose());
+    const Eigen::Quaterniond turn(rotations[c] * earlier.rotations[c].transpose());
     for (int a : body_.mesh.cells[c]) {
       Eigen::Vector4d& sum = sums[static_cast<std::size_t>(a)];
       sum += sum.dot(turn.coeffs()) < 0.0 ? -turn.coeffs() : turn.coeffs();
@@ -238,43 +257,46 @@ std::vector<Eigen::Matrix3d> RotatedModel::turns_since_factor(const Rotations& r
   return turns;
 }
 
-void RotatedModel::precondition(const std::vector<Eigen::Matrix3d>& turns, const Points& residual,
-                                Points& result) const {
+/// The solution for `residual` by an earlier factor, turned at every unknown.
+void precondition(const EarlierFactor& earlier, const std::vector<Eigen::Matrix3d>& turns,
+                  const Points& residual, Points& result) {
   result.resize(residual.rows(), 3);
   for (Eigen::Index i = 0; i < residual.rows(); ++i)
     result.row(i) = residual.row(i) * turns[static_cast<std::size_t>(i)];
-  factor_.solve(Eigen::Map<Eigen::VectorXd>(result.data(), result.size()));
+  earlier.factor.solve(Eigen::Map<Eigen::VectorXd>(result.data(), result.size()));
   for (Eigen::Index i = 0; i < residual.rows(); ++i)
     result.row(i) = (turns[static_cast<std::size_t>(i)] * result.row(i).transpose()).transpose();
 }
 
-/// Adds to `move` the solution of the system for `residual`, but for `enough` of it [N].
+/// Adds to `move` the solution of the system for `residual`, but for `enough` of it.
 SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotations, const Points& residual,
-                                  double enough, Points& move) {
+                                  const Enough& enough, Points& move) {
   SolveReport report;
-  const bool other = factor_inertia_ != balance.inertia || factor_damping_ != balance.damping;
-  if ((other || !factor_.ok()) && !refactor(balance, rotations, report)) return report;
+  EarlierFactor& earlier = balance.inertia == 0.0 ? rest_factor_ : stage_factor_;
+  const bool other = earlier.inertia != balance.inertia || earlier.damping != balance.damping;
+  if ((other || !earlier.factor.ok()) && !refactor(balance, rotations, earlier, report)) return report;
 
   Points r = residual, dx = Points::Zero(r.rows(), 3), z, direction, image;
-  std::vector<Eigen::Matrix3d> turns = turns_since_factor(rotations);
+  std::vector<Eigen::Matrix3d> turns = turns_since(earlier, rotations);
   double rz = 0.0;
   bool fresh = false;
-  for (int since_factor = 0; r.norm() > enough; ++report.iterations, ++since_factor) {
+  for (int since_factor = 0; r.norm() > enough.residual; ++report.iterations, ++since_factor) {
     if (since_factor == options_.stale_after) {
       // With a factor of this very matrix a step or two remain; more means that rounding rules.
       if (fresh) break;
-      if (!refactor(balance, rotations, report)) return report;
-      turns = turns_since_factor(rotations);
+      if (!refactor(balance, rotations, earlier, report)) return report;
+      turns = turns_since(earlier, rotations);
       fresh = true;
       since_factor = 0;
     }
-    precondition(turns, r, z);
+    precondition(earlier, turns, r, z);
     const double next = r.cwiseProduct(z).sum();
     if (!std::isfinite(next)) {
       report.status = SolveStatus::NoConvergence;
       report.message = name_ + ": forces are not finite";
       return report;
     }
+    if (z.rowwise().norm().maxCoeff() <= enough.move) break;
     direction = since_factor == 0 ? z : Points(z + next / rz * direction);
     rz = next;
     image = apply(balance, rotations, direction);
@@ -290,7 +312,7 @@ SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotat
 SolveReport RotatedModel::solve_linear(const Balance& balance, double h, Points& move) {
   const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
   const Points residual = residual_of(balance, rotations, past_rotations(balance), move);
-  return correct(balance, rotations, residual, enough_for(h, residual), move);
+  return correct(balance, rotations, residual, {enough_for(h, residual)}, move);
 }
 
 /// One linear solve as a rule. Its forces balance but for the square of what turns and stretches have changed
@@ -328,7 +350,7 @@ SolveReport RotatedModel::solve_polar(const Balance& balance, double h, double e
     }
     last = left;
     const Points before = move;
-    const SolveReport step = correct(balance, rotations, residual, enough, move);
+    const SolveReport step = correct(balance, rotations, residual, {enough}, move);
     total.iterations += step.iterations;
     total.residual = step.residual;
     if (!step.ok()) return step;
@@ -371,7 +393,7 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
     }
     const Points before = move;
     const SolveReport step =
-        correct(balance, rotations, residual, 0.1 * options_.rest_tolerance * scale_, move);
+        correct(balance, rotations, residual, {0.1 * options_.rest_tolerance * scale_}, move);
     if (!step.ok()) return step;
     if ((move - before).cwiseAbs().maxCoeff() <= 1e-15 * extent) {
       x = balance.origin + move;
@@ -385,6 +407,22 @@ SolveReport RotatedModel::equilibrate(const PoseProblem& problem, Points& x) {
       total.iterations, total.residual);
   name_worst_cell(body_, balance.origin + move, free_.spread(residual), total);
   return total;
+}
+
+/// One linear solve, or a few of Newton's method, as far as it matters.
+SolveReport RotatedModel::approach_rest(const PoseProblem& problem, double slack, Points& x) {
+  const Balance balance = rest_balance(body_, problem, x, grows());
+  Points move = balance.guess;
+  SolveReport report;
+  if (polar_) {
+    report = solve_newton(balance, NewtonOptions().tolerance, move);
+  } else {
+    const Rotations rotations = rotations_(balance.origin + move, *balance.pose);
+    const Points residual = residual_of(balance, rotations, {}, move);
+    report = correct(balance, rotations, residual, {options_.rest_tolerance * scale_, slack}, move);
+  }
+  if (report.ok()) x = balance.origin + move;
+  return report;
 }
 
 }  // namespace
