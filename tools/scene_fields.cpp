@@ -199,7 +199,7 @@ std::string_view trimmed(std::string_view text) {
                                 field.hint.empty() ? "" : fmt::format("; hint: {}", field.hint)));
 }
 
-std::string quoted(std::string_view text) { return fmt::format("'{}'", text); }
+std::string in_quotes(std::string_view text) { return fmt::format("'{}'", text); }
 
 void check_cells(double value, const std::string& where) {
   if (value <= kMaxCells) return;
@@ -260,7 +260,7 @@ Eigen::Vector3d parse_vector(const SceneField& field, std::string_view text, con
     const bool last = i == 2;
     const auto value = parse_number(trimmed(text.substr(0, comma)));
     if (!value || last != (comma == std::string_view::npos)) {
-      refuse(field, quoted(whole), "three numbers x,y,z", where);
+      refuse(field, in_quotes(whole), "three numbers x,y,z", where);
     }
     vector[i] = *value;
     text.remove_prefix(last ? text.size() : comma + 1);
@@ -394,7 +394,7 @@ std::vector<std::string> outside_envelope(const Scene& scene) {
 void set_from_text(Scene& scene, const SceneField& field, std::string_view text, const std::string& where) {
   const auto number = [&] {
     const auto value = parse_number(text);
-    if (!value) refuse(field, quoted(text), "a number, " + range_text(field), where);
+    if (!value) refuse(field, in_quotes(text), "a number, " + range_text(field), where);
     return *value;
   };
   std::visit(
@@ -409,14 +409,14 @@ void set_from_text(Scene& scene, const SceneField& field, std::string_view text,
             for (const std::string& entry : parse_list(text)) {
               const auto value = parse_int(entry);
               if (!value)
-                refuse(field, quoted(entry), "whole numbers with commas, " + range_text(field), where);
+                refuse(field, in_quotes(entry), "whole numbers with commas, " + range_text(field), where);
               (scene.*member).push_back(*value);
             }
           },
           [&](Switch Scene::*member) { scene.*member = parse_choice<Switch>(kSwitchNames, text, where); },
           [&](int Scene::*member) {
             const auto value = parse_int(text);
-            if (!value) refuse(field, quoted(text), "a whole number, " + range_text(field), where);
+            if (!value) refuse(field, in_quotes(text), "a whole number, " + range_text(field), where);
             scene.*member = *value;
           },
           [&](double Scene::*member) { scene.*member = number(); },
