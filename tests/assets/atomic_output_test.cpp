@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "assets/error.h"
+#include "tests/temporary_path.h"
 
 namespace sinew::assets {
 namespace {
@@ -30,7 +31,7 @@ using testing::ThrowsMessage;
 class AtomicOutput : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::path(testing::TempDir()) / ("sinew_atomic_" + std::to_string(::getpid()));
+    root_ = tests::temporary_path("atomic");
     fs::remove_all(root_);
     fs::create_directory(root_);
   }

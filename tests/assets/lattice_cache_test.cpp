@@ -6,12 +6,11 @@
 #include <fstream>
 #include <sstream>
 
-#include <unistd.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/lattice/shapes.h"
+#include "tests/temporary_path.h"
 
 namespace sinew::assets {
 namespace {
@@ -22,9 +21,7 @@ using Eigen::Vector3d;
 class LatticeCache : public testing::Test {
  protected:
   void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    root_ = fs::path(testing::TempDir()) /
-            ("sinew_cache_" + std::string(info->name()) + std::to_string(::getpid()));
+    root_ = tests::temporary_path("cache");
     fs::remove_all(root_);
     fs::create_directory(root_);
     folder_ = cache_folder((root_ / "out").string());

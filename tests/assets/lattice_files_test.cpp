@@ -19,6 +19,7 @@
 #include "tests/assets/lattice_of_arm.h"
 #include "tests/lattice/lattices.h"
 #include "tests/lattice/shapes.h"
+#include "tests/temporary_path.h"
 
 namespace sinew::assets {
 namespace {
@@ -28,7 +29,7 @@ using Eigen::Vector3d;
 /// A file of this test, removed at the end.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::string& name) : path_(testing::TempDir() + "sinew_lattice_" + name) {
+  explicit TemporaryFile(const std::string& name) : path_(tests::temporary_path(name)) {
     std::filesystem::remove(path_);
   }
   TemporaryFile(const std::string& name, const std::string& content) : TemporaryFile(name) {

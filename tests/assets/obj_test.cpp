@@ -10,6 +10,7 @@
 
 #include "assets/error.h"
 #include "assets/pc2.h"
+#include "tests/temporary_path.h"
 
 namespace sinew::assets {
 namespace {
@@ -21,7 +22,7 @@ using testing::ThrowsMessage;
 /// A file that lives as long as the object.
 class TempFile {
  public:
-  TempFile(const std::string& name, const std::string& bytes) : path_(testing::TempDir() + "sinew_" + name) {
+  TempFile(const std::string& name, const std::string& bytes) : path_(tests::temporary_path(name)) {
     std::ofstream(path_, std::ios::binary) << bytes;
   }
   ~TempFile() { std::filesystem::remove(path_); }

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "assets/error.h"
+#include "tests/temporary_path.h"
 
 namespace sinew::assets {
 namespace {
@@ -18,7 +19,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-std::string temp_file(const std::string& name) { return testing::TempDir() + "sinew_pc2_" + name + ".pc2"; }
+std::string temp_file(const std::string& name) { return tests::temporary_path(name + ".pc2"); }
 
 std::string read_bytes(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);

@@ -12,6 +12,7 @@
 
 #include "assets/detail/preview_scene.h"
 #include "assets/error.h"
+#include "tests/temporary_path.h"
 
 namespace sinew::assets {
 namespace {
@@ -213,7 +214,7 @@ TEST(Image, IsReadBackFromPngAsItWasWritten) {
   Image image(37, 11);
   std::mt19937_64 rng(5);
   for (auto& value : image.rgb) value = static_cast<std::uint8_t>(rng());
-  const std::string file = testing::TempDir() + "sinew_image_test.png";
+  const std::string file = tests::temporary_path("image.png");
   write_png(file, image);
   png_image png{};
   png.version = PNG_IMAGE_VERSION;

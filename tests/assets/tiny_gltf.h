@@ -13,6 +13,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/temporary_path.h"
+
 namespace sinew::assets {
 
 /// A glTF small enough to break one thing at a time: a tetrahedron on two joints with one clip. Change
@@ -97,7 +99,7 @@ struct TinyGltf {
 /// A folder of this process alone (tests run side by side), removed at its end; with a slash behind it.
 inline const std::string& test_folder() {
   static const struct Folder {
-    std::string path = testing::TempDir() + "sinew-test-" + std::to_string(::getpid()) + "/";
+    std::string path = tests::temporary_path("files/");
     Folder() { std::filesystem::create_directories(path); }
     ~Folder() {
       std::error_code ignored;

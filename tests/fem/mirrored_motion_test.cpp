@@ -81,7 +81,8 @@ double asymmetry(const Rig& rig, const lattice::ControlLattice& lattice) {
   BodyOptions options;
   DefaultMaterialInput flesh{rig.skin, skeleton, poses};
   flesh.spacing = 0.3;
-  flesh.partners = lattice::find_mirror_map(lattice, rig.skin)->frames;
+  if (const std::optional<lattice::MirrorMap> map = lattice::find_mirror_map(lattice, rig.skin))
+    flesh.partners = map->frames;
   const DefaultMaterials materials = default_materials(flesh);
   options.material = materials.base;
   for (const JointYoung& joint : materials.of_joints)

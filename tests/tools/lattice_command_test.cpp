@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/temporary_path.h"
+
 namespace sinew::tools {
 namespace {
 
@@ -24,8 +26,7 @@ struct Outcome {
 class LatticeCommand : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = testing::TempDir() + "sinew_lattice_command_" +
-              testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = tests::temporary_path("lattice_command");
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directory(folder_);
   }
