@@ -1,6 +1,7 @@
 #include "fem/phong_skin.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -11,29 +12,70 @@ namespace {
 
 using lattice::Points;
 
-/// F_a as rows: F_a = sum_b x_b g_b^T over the vertices b of the cells round a.
+/// F_a as rows: F_a = sum_b x_b g_b^T over the vertices b of a fan of cells round a.
 using VertexGradient = std::map<int, Eigen::Vector3d>;
 
-std::vector<VertexGradient> vertex_gradients(const lattice::LeafMesh& mesh,
+/// Two limbs may meet in nothing but a vertex, on a bone that runs into both: round it cells count together
+/// where they share another of their vertices. Per leaf cell and corner the fan of cells that it is in.
+struct Fans {
+  std::vector<std::array<int, 8>> of_corner;
+  int count = 0;
+};
+
+Fans fans_of(const lattice::LeafMesh& mesh) {
+  struct Corner {
+    std::size_t cell, corner;
+  };
+  std::vector<std::vector<Corner>> round(static_cast<std::size_t>(mesh.num_vertices()));
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c)
+    for (std::size_t k = 0; k < 8; ++k) round[static_cast<std::size_t>(mesh.cells[c][k])].push_back({c, k});
+  Fans fans;
+  fans.of_corner.resize(mesh.cells.size());
+  for (std::size_t a = 0; a < round.size(); ++a) {
+    const std::vector<Corner>& corners = round[a];
+    const auto hang_together = [&](const Corner& x, const Corner& y) {
+      if (mesh.level[x.cell] != mesh.level[y.cell])
+        return true;  // a coarse edge has other ends than its halves
+      const lattice::HexVertices &of_x = mesh.cells[x.cell], &of_y = mesh.cells[y.cell];
+      return std::any_of(of_x.begin(), of_x.end(), [&](int v) {
+        return v != static_cast<int>(a) && std::find(of_y.begin(), of_y.end(), v) != of_y.end();
+      });
+    };
+    std::vector<char> taken(corners.size(), 0);
+    for (std::size_t first = 0; first < corners.size(); ++first) {
+      if (taken[first]) continue;
+      std::vector<std::size_t> fan{first};
+      taken[first] = 1;
+      for (std::size_t i = 0; i < fan.size(); ++i)
+        for (std::size_t k = 0; k < corners.size(); ++k)
+          if (!taken[k] && hang_together(corners[fan[i]], corners[k])) taken[k] = 1, fan.push_back(k);
+      for (const std::size_t i : fan) fans.of_corner[corners[i].cell][corners[i].corner] = fans.count;
+      ++fans.count;
+    }
+  }
+  return fans;
+}
+
+std::vector<VertexGradient> vertex_gradients(const lattice::LeafMesh& mesh, const Fans& fans,
                                              const std::vector<lattice::FillFractions>& fill) {
-  std::vector<VertexGradient> gradients(static_cast<std::size_t>(mesh.num_vertices()));
+  std::vector<VertexGradient> gradients(static_cast<std::size_t>(fans.count));
   std::vector<double> weight(gradients.size(), 0.0);
   for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
     const CellGeometry cell = cell_geometry(lattice::hex_corners(mesh.points, mesh.cells[c]), fill[c]);
     lattice::HexGradients flesh = lattice::HexGradients::Zero();  // of the whole cell, times its volume
     for (std::size_t q = 0; q < 8; ++q) flesh += cell.weights[q] * cell.gradients[q];
-    for (const int a : mesh.cells[c]) {
-      weight[static_cast<std::size_t>(a)] += cell.volume;
+    for (const int fan : fans.of_corner[c]) {
+      weight[static_cast<std::size_t>(fan)] += cell.volume;
       for (std::size_t k = 0; k < 8; ++k) {
-        Eigen::Vector3d& sum = gradients[static_cast<std::size_t>(a)]
+        Eigen::Vector3d& sum = gradients[static_cast<std::size_t>(fan)]
                                    .try_emplace(mesh.cells[c][k], Eigen::Vector3d::Zero())
                                    .first->second;
         sum += flesh.row(static_cast<Eigen::Index>(k)).transpose();
       }
     }
   }
-  for (std::size_t a = 0; a < gradients.size(); ++a)
-    for (auto& [vertex, gradient] : gradients[a]) gradient /= weight[a];
+  for (std::size_t f = 0; f < gradients.size(); ++f)
+    for (auto& [vertex, gradient] : gradients[f]) gradient /= weight[f];
   return gradients;
 }
 
@@ -67,7 +109,8 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> phong_rows(const lattice::LeafMesh&
                                                         const lattice::Embedding& skin,
                                                         const lattice::Surface& surface, double share) {
   if (!(share > 0.0)) return skin.weights;
-  const std::vector<VertexGradient> gradients = vertex_gradients(mesh, fill);
+  const Fans fans = fans_of(mesh);
+  const std::vector<VertexGradient> gradients = vertex_gradients(mesh, fans, fill);
   const std::vector<double> lengths = edge_lengths(surface);
   std::vector<Eigen::Triplet<double>> triplets;
   for (int k = 0; k < skin.weights.outerSize(); ++k) {
@@ -81,7 +124,10 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> phong_rows(const lattice::LeafMesh&
       row[a] += it.value();
       if (s == 0.0) continue;
       const Eigen::Vector3d arm = (surface.points.row(k) - mesh.points.row(a)).transpose();
-      for (const auto& [b, gradient] : gradients[static_cast<std::size_t>(a)])
+      const auto cell = static_cast<std::size_t>(skin.cell[static_cast<std::size_t>(k)]);
+      const auto corner = static_cast<std::size_t>(
+          std::find(mesh.cells[cell].begin(), mesh.cells[cell].end(), a) - mesh.cells[cell].begin());
+      for (const auto& [b, gradient] : gradients[static_cast<std::size_t>(fans.of_corner[cell][corner])])
         row[b] += s * it.value() * gradient.dot(arm);
     }
     for (const auto& [b, value] : row) triplets.emplace_back(k, b, value);

@@ -130,6 +130,14 @@ LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const C
   for (std::size_t j = 0; j < bone_frame.size(); ++j)
     for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b)
       if (skeleton.bones[b].frame == bone_frame[j]) bones_of_[j].push_back(b);
+  std::vector<bool> has_skin(frame_of_joint_.size(), false);
+  for (const std::vector<Influence>& influences : input.skin.weights)
+    if (const int frame = skin_frame(influences, frame_of_joint_); frame >= 0) has_skin[frame] = true;
+  for (int b = 0; b < static_cast<int>(skeleton.bones.size()); ++b) {
+    const ReducedBone& bone = skeleton.bones[b];
+    const bool bare = !bone.soft && !has_skin[bone.frame];
+    frame_of_bone_.push_back(bare ? static_cast<int>(frame_of_joint_.size()) + b : bone.frame);
+  }
   const UnitSkin& skin = input.unit_skin;
   frames_ = frames_of_triangles(input, frame_of_joint_);
   for (std::size_t v = 0; v < skin.weights.size(); ++v) {
@@ -145,7 +153,10 @@ LimbMap::LimbMap(const RigInput& input, const ReducedSkeleton& skeleton, const C
     join_flesh(labels[c], lattice.complex.cells[c]);
   }
   if (input.mirror) mirror(labels);
-  for (const Label& label : labels) limbs_.push_back(gather(label));
+  for (const Label& label : labels) {
+    limbs_.push_back(gather(label));
+    has_skin_.push_back(label.has_skin);
+  }
 }
 
 LimbPiece LimbMap::piece_at(int frame, const Vector3d& p) const {
@@ -171,11 +182,12 @@ void LimbMap::add(Label& label, int frame, const Vector3d& p) const {
 
 void LimbMap::add_bone(Label& label, int bone, const Vector3d& p) const {
   merge(label.pieces, bone_at(bone, p)[0]);
-  label.bones.emplace_back(skeleton_.bones[bone].frame, p);
+  label.bones.emplace_back(frame_of_bone_[bone], p);
 }
 
 /// A triangle of the skin in a cell: its corners must not part, whatever they hang on.
 void LimbMap::add_triangle(Label& label, int triangle, const Vector3d& p) const {
+  label.has_skin = true;
   const std::array<int, 3>& frames = frames_[triangle];
   for (int k = 0; k < 3; ++k) {
     const int v = input_.unit_skin.triangles(triangle, k);
@@ -276,9 +288,29 @@ void LimbMap::label_bones(std::vector<Label>& labels) const {
   }
 }
 
+int LimbMap::joint_of(int frame) const {
+  return is_bare(frame) ? skeleton_.bones[bone_of(frame)].frame : frame;
+}
+
+/// Whether flesh of `frame` hangs on the end of that of `parent`.
+bool LimbMap::is_above(int parent, int frame) const {
+  const int joint = input_.unit_joints.parents[joint_of(frame)];
+  if (joint < 0 || frame_of_joint_[joint] != joint_of(parent)) return false;
+  if (!is_bare(parent)) return true;
+  const int end = skeleton_.bones[bone_of(parent)].end;
+  if (is_bare(frame)) return skeleton_.bones[bone_of(frame)].start == end;
+  return std::any_of(bones_of_[frame].begin(), bones_of_[frame].end(),
+                     [&](int b) { return skeleton_.bones[b].start == end; });
+}
+
+int LimbMap::image(int frame) const {
+  if (!is_bare(frame)) return input_.mirror->joint[frame];
+  return static_cast<int>(frame_of_joint_.size()) + skeleton_.mirror_bone[bone_of(frame)];
+}
+
 LimbPiece LimbMap::image(const LimbPiece& piece) const {
   LimbPiece result = piece;
-  result.frame = input_.mirror->joint[piece.frame];
+  result.frame = image(piece.frame);
   if (piece.stretch.bone >= 0) result.stretch.bone = skeleton_.mirror_bone[piece.stretch.bone];
   return result;
 }
@@ -307,9 +339,9 @@ void LimbMap::mirror(std::vector<Label>& labels) const {
     std::sort(key.begin(), key.end());
     const auto found = cell_of.find(key);
     if (found == cell_of.end()) continue;
+    labels[c].has_skin = labels[c].has_skin || own[found->second].has_skin;
     for (const LimbPiece& piece : own[found->second].pieces) merge(labels[c].pieces, image(piece));
-    for (const auto& [a, b] : own[found->second].joined)
-      labels[c].joined.push_back({input_.mirror->joint[a], input_.mirror->joint[b]});
+    for (const auto& [a, b] : own[found->second].joined) labels[c].joined.push_back({image(a), image(b)});
   }
 }
 
@@ -332,10 +364,6 @@ void LimbMap::join_flesh(Label& label, const Cell& cell) const {
   const auto holds = [](const std::vector<int>& frames, int frame) {
     return std::find(frames.begin(), frames.end(), frame) != frames.end();
   };
-  const auto above = [&](int frame) {
-    const int parent = input_.unit_joints.parents[frame];
-    return parent < 0 ? -1 : frame_of_joint_[parent];
-  };
   // A corner of a limb that no sample is in is flesh that reaches nothing here.
   const auto is_speck = [&](int frame) {
     return !flesh.has(frame) && holds(label.skins, frame) && !holds(label.sheets, frame);
@@ -343,10 +371,10 @@ void LimbMap::join_flesh(Label& label, const Cell& cell) const {
   for (const auto& [a, b] : near) {
     const bool both_known = flesh.has(a) && flesh.has(b);
     const CellFlesh::Contact contact = flesh.contact(a, b);
-    const bool are_one =
-        both_known ? contact == CellFlesh::Contact::Continuous ||
-                         (contact == CellFlesh::Contact::Overlap && (above(a) == b || above(b) == a))
-                   : !is_speck(a) && !is_speck(b);
+    const bool follow = is_above(a, b) || is_above(b, a);
+    const bool are_one = both_known ? contact == CellFlesh::Contact::Continuous ||
+                                          (contact == CellFlesh::Contact::Overlap && follow)
+                                    : !is_speck(a) && !is_speck(b) && (follow || !(is_bare(a) || is_bare(b)));
     if (are_one) label.joined.push_back({a, b});
   }
 }
@@ -403,7 +431,6 @@ bool LimbMap::share_frame(const Limb& a, const Limb& b) {
 }
 
 /// Mean target edge at vertices of the lattice (-1: none), unit coordinates.
-
 double LimbMap::edge_at(std::span<const int> vertices) const {
   if (lattice_.is_grid || input_.sizes.is_uniform(h_)) return h_;
   double sum = 0.0, count = 0.0;
@@ -446,7 +473,7 @@ Limb LimbMap::bone_at(int bone, const Vector3d& p) const {
   const Vector3d start = skeleton_.nodes[skeleton_.bones[bone].start].position;
   const Vector3d end = skeleton_.nodes[skeleton_.bones[bone].end].position;
   const double s = std::clamp((p - start).dot(end - start) / (end - start).squaredNorm(), 0.0, 1.0);
-  return {{skeleton_.bones[bone].frame, {bone, s, s}}};
+  return {{frame_of_bone_[bone], {bone, s, s}}};
 }
 
 }  // namespace sinew::lattice::detail

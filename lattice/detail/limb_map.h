@@ -25,7 +25,7 @@ std::vector<CellFace> faces_of(const CellComplex& complex);
 
 /// Flesh that hangs on one stretch of a bone.
 struct LimbPiece {
-  int frame = -1;  ///< joint.
+  int frame = -1;  ///< joint, or that of a bare bone (LimbMap).
   BoneStretch stretch;
 };
 
@@ -39,6 +39,9 @@ using Limb = std::vector<LimbPiece>;
 /// on a thigh is not of one limb with it. Of sheets and of bones outside the flesh nobody knows where flesh
 /// is: there the way along the skeleton decides alone.
 ///
+/// A bare bone, one of a joint that no skin follows, has a frame of its own, past the joints: two hip bones
+/// of one pelvis do not tie the thighs that they run into. Out of flesh it goes with the bones at its ends.
+///
 /// Of a mirrored rig what is found in a place is also there in its mirror image: triangles may be split in
 /// two ways, and a vertex in the plane follows one frame of two alike.
 class LimbMap {
@@ -49,6 +52,8 @@ class LimbMap {
 
   /// The limbs in a cell, ascending; none where neither skin nor bone is in it.
   const std::vector<Limb>& limbs(int cell) const { return limbs_[cell]; }
+  /// Whether skin is in a cell, also such that follows no frame.
+  bool has_skin(int cell) const { return has_skin_[cell]; }
   /// Shortest way along the skeleton, unit coordinates; 0 where they follow the same frame.
   double distance(const Limb& a, const Limb& b) const;
   /// Whether flesh of one frame is in both.
@@ -56,6 +61,9 @@ class LimbMap {
   /// Of the flesh at p (unit coordinates): as the closest skin; of a mirrored rig also as the image of what
   /// is at the image of p. None outside the skin.
   std::vector<Limb> flesh_at(const Eigen::Vector3d& p) const;
+  /// The joint of a frame.
+  int joint_of(int frame) const;
+  bool is_bare(int frame) const { return frame >= static_cast<int>(frame_of_joint_.size()); }
   /// Of the bone at a vertex of its chain.
   Limb bone_at(int bone, const Eigen::Vector3d& p) const;
   /// The frame of every joint before floating parts get soft frames of their own.
@@ -69,6 +77,7 @@ class LimbMap {
     std::vector<int> skins;                              ///< frames of skin that is there.
     std::vector<int> sheets;                             ///< frames of skin with no flesh behind it.
     std::vector<std::pair<int, Eigen::Vector3d>> bones;  ///< frames and places along their bones.
+    bool has_skin = false;
   };
   struct Corners {
     std::array<Eigen::Vector3d, 3> points;
@@ -82,6 +91,9 @@ class LimbMap {
   void label_skin(std::vector<Label>& labels, const std::vector<CellFace>& faces) const;
   void label_bones(std::vector<Label>& labels) const;
   void mirror(std::vector<Label>& labels) const;
+  int bone_of(int bare_frame) const { return bare_frame - static_cast<int>(frame_of_joint_.size()); }
+  bool is_above(int parent, int frame) const;
+  int image(int frame) const;
   LimbPiece image(const LimbPiece& piece) const;
   std::optional<Limb> own_flesh_at(const Eigen::Vector3d& p) const;
   double edge_at(std::span<const int> vertices) const;
@@ -92,13 +104,15 @@ class LimbMap {
   const ReducedSkeleton& skeleton_;
   const ControlLattice& lattice_;
   SkeletonDistance distance_;
-  double h_;                                ///< unit coordinates.
-  std::vector<int> frame_of_joint_;         ///< with the soft frames of the skeleton.
+  double h_;                         ///< unit coordinates.
+  std::vector<int> frame_of_joint_;  ///< with the soft frames of the skeleton.
+  std::vector<int> frame_of_bone_;
   std::vector<std::vector<int>> bones_of_;  ///< per joint: those its weight counts for.
   std::vector<std::array<int, 3>> frames_;  ///< of the corners of the welded skin's triangles.
   std::vector<bool> is_sheet_;              ///< per welded vertex: no flesh is behind it.
   TriangleGrid grid_;                       ///< the skin's triangles.
   std::vector<std::vector<Limb>> limbs_;
+  std::vector<bool> has_skin_;  ///< per cell.
 };
 
 }  // namespace sinew::lattice::detail

@@ -1,6 +1,7 @@
 #include "lattice/detail/separate_limbs.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <set>
@@ -45,6 +46,7 @@ class Separation {
   static constexpr int kSimple = -1;  ///< link of a face that its cells just share.
 
   void number_instances();
+  bool is_air(int cell) const { return air_[cell] != 0; }
   int link(const CellFace& face);
   bool is_single(int cell) const { return first_[cell + 1] - first_[cell] == 1; }
   std::vector<Limb> flesh_on(const CellFace& face) const;
@@ -53,6 +55,7 @@ class Separation {
   bool is_of_bone(const std::vector<int>& part, const std::vector<Limb>& bones) const;
   void split_vertices();
   void rebuild();
+  void drop_unused_vertices();
 
   const RigInput& input_;
   ControlLattice& lattice_;
@@ -60,6 +63,7 @@ class Separation {
   LimbMap limbs_;
   std::vector<Instance> instances_;  ///< by cell.
   std::vector<int> first_;           ///< first instance of every cell, and the end.
+  std::vector<std::uint8_t> air_;    ///< cells with neither flesh nor bone.
   std::vector<int> link_of_face_;    ///< index into links_ or kSimple.
   std::vector<Links> links_;
   std::vector<bool> is_touched_;  ///< vertices that may have to be split.
@@ -72,6 +76,12 @@ void Separation::number_instances() {
     const std::vector<Limb>& limbs = limbs_.limbs(c);
     for (const Limb& limb : limbs) instances_.push_back({c, limb, cells[c].vertices});
     if (limbs.empty()) instances_.push_back({c, {}, cells[c].vertices});
+    // No skin crosses it, so it is flesh or air as a whole.
+    Vector3d mean = Vector3d::Zero();
+    const int n = num_corners(cells[c].type);
+    for (int k = 0; k < n; ++k) mean += lattice_.complex.points.row(cells[c].vertices[k]).transpose() / n;
+    air_.push_back(limbs.empty() && !limbs_.has_skin(c) &&
+                   limbs_.flesh_at(input_.unit_skin.to_unit(mean)).empty());
     if (limbs.size() < 2) continue;
     for (int k = 0; k < num_corners(cells[c].type); ++k) is_touched_[cells[c].vertices[k]] = true;
   }
@@ -115,14 +125,20 @@ int Separation::owner(int cell, const Limb& flesh) const {
 /// Cells share a face where both hold flesh of one frame, or flesh passes through it; copies where they hold
 /// flesh of one frame, or own the same flesh on the face.
 int Separation::link(const CellFace& face) {
-  if (face.second < 0) return kSimple;
+  // Cells of two limbs may meet in nothing but an edge or a vertex, and only round the outside.
+  if (face.second < 0) {
+    for (int v : face.vertices)
+      if (v >= 0) is_touched_[v] = true;
+    return kSimple;
+  }
   const bool are_single = is_single(face.first) && is_single(face.second);
-  if (are_single) {
+  const bool is_open = is_air(face.first) || is_air(face.second);
+  if (are_single && !is_open) {
     const Limb &a = instances_[first_[face.first]].limb, &b = instances_[first_[face.second]].limb;
     if (a.empty() || b.empty() || LimbMap::share_frame(a, b) || !flesh_on(face).empty()) return kSimple;
   }
   std::set<std::array<int, 2>> links;
-  if (!are_single) {
+  if (!are_single && !is_open) {
     for (int i = first_[face.first]; i < first_[face.first + 1]; ++i)
       for (int k = first_[face.second]; k < first_[face.second + 1]; ++k)
         if (LimbMap::share_frame(instances_[i].limb, instances_[k].limb)) links.insert({i, k});
@@ -228,38 +244,69 @@ void Separation::split_vertices() {
     points.row(count + static_cast<Eigen::Index>(i)) = points.row(original[i]).eval();
 }
 
-/// Instances with all their vertices in common are one cell after all.
+/// Air is left out: it would hold limbs together that meet in it alone. Instances with all their vertices in
+/// common are one cell after all.
 void Separation::rebuild() {
   std::vector<Cell>& cells = lattice_.complex.cells;
   std::vector<CellCopy> copies;
-  std::vector<Cell> more;
-  const int count = static_cast<int>(cells.size());
+  std::vector<Cell> kept, more;
+  const int count = static_cast<int>(cells.size()),
+            num_kept = count - static_cast<int>(std::count(air_.begin(), air_.end(), 1));
   for (int c = 0; c < count; ++c) {
+    if (is_air(c)) continue;
+    const int place = static_cast<int>(kept.size());
     std::vector<std::array<int, 8>> distinct;
-    std::vector<std::set<int>> frames;
+    std::vector<std::set<int>> frames, bare_joints;
     for (int i = first_[c]; i < first_[c + 1]; ++i) {
       const auto same = std::find(distinct.begin(), distinct.end(), instances_[i].vertices);
       const auto at = static_cast<std::size_t>(same - distinct.begin());
       if (same == distinct.end()) {
         distinct.push_back(instances_[i].vertices);
         frames.emplace_back();
+        bare_joints.emplace_back();
       }
-      for (const LimbPiece& piece : instances_[i].limb) frames[at].insert(piece.frame);
+      for (const LimbPiece& piece : instances_[i].limb)
+        (limbs_.is_bare(piece.frame) ? bare_joints : frames)[at].insert(limbs_.joint_of(piece.frame));
     }
+    // Bones of one joint that no skin follows may be in several copies: then it counts for none of them.
+    for (std::size_t k = 0; k < distinct.size(); ++k)
+      for (const int joint : bare_joints[k])
+        if (std::count_if(bare_joints.begin(), bare_joints.end(),
+                          [&](const std::set<int>& others) { return others.contains(joint); }) == 1)
+          frames[k].insert(joint);
     for (std::size_t k = 0; k < distinct.size(); ++k) {
-      const int cell = k == 0 ? c : count + static_cast<int>(more.size());
-      if (k == 0) {
-        cells[c].vertices = distinct[0];
-      } else {
-        more.push_back({cells[c].type, distinct[k]});
-      }
-      if (distinct.size() > 1) copies.push_back({cell, c, {frames[k].begin(), frames[k].end()}});
+      const int cell = k == 0 ? place : num_kept + static_cast<int>(more.size());
+      (k == 0 ? kept : more).push_back({cells[c].type, distinct[k]});
+      if (distinct.size() > 1) copies.push_back({cell, place, {frames[k].begin(), frames[k].end()}});
     }
   }
+  cells = std::move(kept);
   cells.insert(cells.end(), more.begin(), more.end());
+  drop_unused_vertices();
   std::sort(copies.begin(), copies.end(),
             [](const CellCopy& a, const CellCopy& b) { return a.cell < b.cell; });
   lattice_.copies = std::move(copies);
+}
+
+/// Those of cells that are gone; the others keep their order.
+void Separation::drop_unused_vertices() {
+  CellComplex& complex = lattice_.complex;
+  std::vector<int> number(complex.points.rows(), -1);
+  for (const Cell& cell : complex.cells)
+    for (int k = 0; k < num_corners(cell.type); ++k) number[cell.vertices[k]] = 0;
+  for (const LatticeBone& bone : lattice_.bones)
+    for (int v : bone.chain) number[v] = 0;
+  int count = 0;
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    if (number[v] < 0) continue;
+    number[v] = count;
+    complex.points.row(count++) = complex.points.row(static_cast<Eigen::Index>(v)).eval();
+  }
+  complex.points.conservativeResize(count, 3);
+  for (Cell& cell : complex.cells)
+    for (int k = 0; k < num_corners(cell.type); ++k) cell.vertices[k] = number[cell.vertices[k]];
+  for (LatticeBone& bone : lattice_.bones)
+    for (int& v : bone.chain) v = number[v];
 }
 
 }  // namespace

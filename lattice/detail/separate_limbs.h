@@ -12,8 +12,8 @@ namespace sinew::lattice::detail {
 /// vertices in the copies of its own limb, the others get vertices at the same places.
 ///
 /// Copies beyond the first of a place come after all other cells; `lattice.copies` lists them. A face may
-/// then belong to more than two cells. Needs cells, bones and edge length of `lattice`; its first vertices
-/// and cells keep their numbers.
+/// then belong to more than two cells. Cells of air, with neither flesh nor bone, are left out, and vertices
+/// with them. Needs cells, bones and edge length of `lattice`; its cells and vertices keep their order.
 void separate_limbs(const RigInput& input, const ReducedSkeleton& skeleton, ControlLattice& lattice);
 
 }  // namespace sinew::lattice::detail

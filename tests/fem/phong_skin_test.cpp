@@ -1,5 +1,7 @@
 #include "fem/phong_skin.h"
 
+#include <optional>
+
 #include <gtest/gtest.h>
 
 #include "lattice/box.h"
@@ -53,6 +55,24 @@ TEST(PhongSkin, ReproducesQuadraticBendingWithHalf) {
   exact.col(2) += exact.col(0).cwiseAbs2();
   EXPECT_LE((block.rows(0.5) * bent - exact).cwiseAbs().maxCoeff(), 1e-13);
   EXPECT_GE((block.rows(0.0) * bent - exact).cwiseAbs().maxCoeff(), 0.2 / 64.0);
+}
+
+// Two limbs that meet in one vertex, where a bone runs into both: neither moves the skin of the other.
+TEST(PhongSkin, DoesNotReachThroughAVertex) {
+  using lattice::CellType;
+  std::vector<std::optional<CellType>> types(8);
+  types[0] = types[7] = CellType::Hexahedron;  // opposite corners of the block
+  const lattice::Hierarchy hierarchy(
+      lattice::box_lattice({{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, CellType::Hexahedron, types}), 1);
+  const lattice::LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);
+  const lattice::Surface skin = tests::box_skin({0.3, 0.3, 0.3}, {0.49, 0.49, 0.49}, 0.03);
+  const std::vector<lattice::FillFractions> fill(mesh.cells.size(),
+                                                 lattice::FillFractions{1, 1, 1, 1, 1, 1, 1, 1});
+  const Rows rows = phong_rows(mesh, fill, lattice::embed(mesh, skin.points), skin, 0.5);
+  Points moved = mesh.points;
+  for (Eigen::Index a = 0; a < moved.rows(); ++a)
+    if (moved.row(a).minCoeff() > 0.5 - 1e-9 && moved.row(a).maxCoeff() > 0.5 + 1e-9) moved.row(a) *= 2.0;
+  EXPECT_EQ((rows * moved - rows * mesh.points).cwiseAbs().maxCoeff(), 0.0);
 }
 
 TEST(PhongSkin, LeavesSkinAloneWhoseTrianglesAreAsLongAsCells) {
