@@ -35,10 +35,14 @@ double default_young(const FleshLoad& load) {
   const double mu = std::max({16.0 * rho * load.frequency * load.frequency * t * t,
                               rho * load.gravity * t / 0.12, 2.0 * rho * load.motion * t});
   const double young = 2.0 * (1.0 + load.poisson) * mu;
-  if (!(load.overhang > 0.0)) return young;
-  const double d = std::max(load.half_thickness, 0.15 * load.overhang);
-  const double slender = rho * load.overhang * load.overhang * load.overhang / (d * d);
-  return std::max({young, 5.0 * slender * load.gravity, 2.0 * slender * load.motion});
+  // rho L^3 / d^2 of a cantilever.
+  const auto slender = [&](double length) {
+    const double d = std::max(load.half_thickness, 0.15 * length);
+    return length > 0.0 ? rho * length * length * length / (d * d) : 0.0;
+  };
+  const double side = slender(load.overhang), tip = slender(load.tip);
+  return std::max({young, 5.0 * side * load.gravity, 2.0 * side * load.motion, 17.0 * tip * load.gravity,
+                   7.0 * tip * load.motion});
 }
 
 double default_frequency(double size, double fastest) {
@@ -65,6 +69,7 @@ DefaultMaterials default_materials(const DefaultMaterialInput& input) {
     load.thickness = std::max(materials.thickness, f.radius);
     load.half_thickness = f.half_thickness;
     load.overhang = f.overhang;
+    load.tip = f.tip;
     load.motion = usual_acceleration(j, f.ends, input);
     young[static_cast<std::size_t>(j)] = default_young(load);
   }

@@ -16,6 +16,7 @@ struct FleshLoad {
   double thickness = 0.0;       ///< t: of the limb, from the bone to the skin [m]; > 0.
   double half_thickness = 0.0;  ///< of what stands out from the bone [m]; > 0 where something does.
   double overhang = 0.0;        ///< how far it stands out [m].
+  double tip = 0.0;             ///< how far flesh goes on beyond the end of the last bone [m].
   double motion = 0.0;          ///< acceleration of its bones [m/s^2].
   double frequency = 8.0;       ///< f: what it swings at [Hz].
   double density = 1000.0;      ///< rho [kg/m^3].
@@ -29,7 +30,9 @@ struct FleshLoad {
 /// and of which what stands out from the bone, a cantilever of length L and half thickness d, sinks by at
 /// most a tenth of its length under gravity and a quarter under the motion: E >= 5 rho g L^3 / d^2, 2 rho a
 /// L^3 / d^2. A sheet counts as at least 0.15 L thick: cells cannot hold a thinner one, and E would be
-/// without bounds.
+/// without bounds. What goes on beyond the last bone hangs on the end of a line and gives way there, too: a
+/// round limb of L = 2.4 d sinks by 1.7 rho g L^4 / (E d^2), so of it E >= 17 rho g L^3 / d^2, 7 rho a L^3 /
+/// d^2.
 double default_young(const FleshLoad& load);
 
 /// What flesh of a character of that size swings at [Hz]: 7 Hz at 1.8 m, like the root of its size, so that

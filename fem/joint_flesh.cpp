@@ -62,7 +62,7 @@ constexpr double kTip = 0.8;
 class Bones {
  public:
   Bones(const skeleton::Skeleton& skeleton, const std::vector<std::vector<Sample>>& samples)
-      : of_joint_(samples.size()), ends_(samples.size()) {
+      : of_joint_(samples.size()), ends_(samples.size()), beyond_(samples.size(), 0.0) {
     const int n = skeleton.num_joints();
     std::vector<char> carries(samples.size(), 0);
     for (int j = n - 1; j >= 0; --j) {
@@ -79,11 +79,17 @@ class Bones {
       of_joint_[at(parent)].push_back({origin(parent), origin(j)});
       ends_[at(parent)].push_back(j);
     }
-    for (int j = 0; j < n; ++j)
-      if (of_joint_[at(j)].empty()) of_joint_[at(j)].push_back(tip(origin(j), samples[at(j)]));
+    for (int j = 0; j < n; ++j) {
+      if (!of_joint_[at(j)].empty()) continue;
+      of_joint_[at(j)].push_back(tip(origin(j), samples[at(j)]));
+      const Segment& bone = of_joint_[at(j)].back();
+      beyond_[at(j)] = (1.0 / kTip - 1.0) * (bone.end - bone.start).norm();
+    }
   }
 
   const std::vector<int>& ends(int joint) const { return ends_[at(joint)]; }
+  /// How far flesh reaches beyond the end of the joint's last bone [m].
+  double beyond(int joint) const { return beyond_[at(joint)]; }
 
   /// From the nearest of the joint's bones to p.
   Eigen::Vector3d arm(int joint, const Eigen::Vector3d& p) const {
@@ -110,6 +116,7 @@ class Bones {
 
   std::vector<std::vector<Segment>> of_joint_;
   std::vector<std::vector<int>> ends_;
+  std::vector<double> beyond_;
 };
 
 }  // namespace
@@ -121,6 +128,7 @@ std::vector<JointFlesh> joint_flesh(const lattice::Surface& skin, const skeleton
   for (int j = 0; j < skeleton.num_joints(); ++j) {
     JointFlesh& f = flesh[static_cast<std::size_t>(j)];
     f.ends = bones.ends(j);
+    f.tip = bones.beyond(j);
     std::vector<WeightedValue> distances;
     double outwards = 0.0;
     for (const Sample& s : samples[static_cast<std::size_t>(j)]) {

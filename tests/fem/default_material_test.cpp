@@ -83,6 +83,14 @@ TEST(DefaultYoung, HoldsWhatStandsOutFromTheBone) {
   EXPECT_NEAR(default_young(load), 1090000.0, 1e-3);
 }
 
+// 17 * 1000 * 9.81 * 0.12^3 / 0.05^2 Pa; at 40 m/s^2 7 * 1000 * 40 * 0.6912.
+TEST(DefaultYoung, HoldsWhatGoesOnBeyondTheLastBone) {
+  FleshLoad load{.thickness = 0.05, .half_thickness = 0.05, .tip = 0.12};
+  EXPECT_NEAR(default_young(load), 115271.424, 1e-3);
+  load.motion = 40.0;
+  EXPECT_NEAR(default_young(load), 193536.0, 1e-3);
+}
+
 TEST(DefaultFrequency, FallsLikeTheRootOfTheSize) {
   EXPECT_NEAR(default_frequency(1.8, 30.0), 7.0, 1e-12);
   EXPECT_NEAR(default_frequency(28.8, 30.0), 1.75, 1e-12);  // 16 times as large
