@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -28,8 +29,11 @@ constexpr std::pair kCrease{25.0 * std::numbers::pi / 180.0, 40.0 * std::numbers
 /// Cosine between a triangle and where the skin round it has turned plain skinning's.
 constexpr std::pair kFlip{0.5, -0.1};
 constexpr int kRings = 3, kIterations = 30;
-/// Laying one place back may crease its rim: so often is looked again.
-constexpr int kPasses = 4;
+/// Laying one place back may crease its rim: so often is looked again, every second time three rings farther.
+/// Where plain skinning itself squeezes a triangle to next to nothing, the least difference that is left
+/// turns it over: what the first passes leave is drawn to plain skinning itself, from the eighth on all of
+/// it.
+constexpr int kPasses = 10, kSmoothPasses = 4, kPlainPass = 7;
 
 double ramp(double x, const std::pair<double, double>& from_to) {
   return std::clamp((x - from_to.first) / (from_to.second - from_to.first), 0.0, 1.0);
@@ -187,34 +191,41 @@ std::vector<double> SkinGuard::faults(const Points& skin, const Side& plain) con
   return result;
 }
 
-/// Lets weights fade over the rings round them.
-void SkinGuard::spread(std::vector<double>& weights) const {
-  constexpr double kFade = 1.0 - 1.0 / (kRings + 1.0);
-  for (int ring = 0; ring < kRings; ++ring) {
+/// Lets weights fade, all the way to nothing, over so many rings round them.
+void SkinGuard::spread(std::vector<double>& weights, int rings) const {
+  const double step = 1.0 / (rings + 1.0);
+  for (int ring = 0; ring < rings; ++ring) {
     const std::vector<double> before = weights;
     for (std::size_t v = 0; v < weights.size(); ++v)
       for (int e = row_start_[v]; e < row_start_[v + 1]; ++e)
         weights[v] = std::max(
-            weights[v], kFade * before[static_cast<std::size_t>(neighbour_[static_cast<std::size_t>(e)])]);
+            weights[v], before[static_cast<std::size_t>(neighbour_[static_cast<std::size_t>(e)])] - step);
   }
 }
 
 Mended SkinGuard::mend(const Points& plain, Points& skin) const {
-  Mended mended;
   const Side side{plain, forms(plain), angles(plain)};
-  std::vector<double> weights(area_.size(), 0.0);
-  Points added;  // d
-  Points x = skin;
-  for (int pass = 0; pass < kPasses; ++pass) {
+  std::vector<double> weights(area_.size(), 0.0), pulls = weights, best_weights = weights;
+  Points x = skin, best = skin;
+  double least = std::numeric_limits<double>::infinity();
+  // The last look judges the last pass. What helps one place may harm another, so the best of all is kept.
+  for (int pass = 0; pass <= kPasses; ++pass) {
     std::vector<double> found = faults(x, side);
-    if (std::all_of(found.begin(), found.end(), [](double fault) { return fault < 1e-3; })) break;
-    spread(found);
+    double wrong = 0.0;
+    for (std::size_t v = 0; v < found.size(); ++v) wrong += area_[v] * found[v];
+    if (wrong < least) least = wrong, best = x, best_weights = weights;
+    if (pass == kPasses || std::all_of(found.begin(), found.end(), [](double fault) { return fault < 1e-3; }))
+      break;
+    spread(found, kRings * (1 + pass / 2));
     std::vector<int> moving;
     for (std::size_t v = 0; v < weights.size(); ++v) {
       weights[v] = std::max(weights[v], found[v]);
+      if (pass >= kSmoothPasses) pulls[v] = std::max(pulls[v], found[v]);
       if (weights[v] > 0.0) moving.push_back(static_cast<int>(v));
     }
-    added = skin - plain;
+    const double keep =
+        1.0 - ramp(pass, {static_cast<double>(kSmoothPasses - 1), static_cast<double>(kPlainPass)});
+    Points added = skin - plain;  // d
     Points smooth(static_cast<Eigen::Index>(moving.size()), 3);
     for (int iteration = 0; iteration < kIterations; ++iteration) {
       for (std::size_t i = 0; i < moving.size(); ++i) {
@@ -222,25 +233,28 @@ Mended SkinGuard::mend(const Points& plain, Points& skin) const {
         Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
         for (int e = row_start_[v]; e < row_start_[v + 1]; ++e)
           sum += added.row(neighbour_[static_cast<std::size_t>(e)]);
-        const double count = row_start_[v + 1] - row_start_[v];
+        const double count = row_start_[v + 1] - row_start_[v], kept = 1.0 - (1.0 - keep) * pulls[v];
         const Eigen::RowVector3d own = skin.row(moving[i]) - plain.row(moving[i]);
-        smooth.row(static_cast<Eigen::Index>(i)) = (1.0 - weights[v]) * own + (weights[v] / count) * sum;
+        smooth.row(static_cast<Eigen::Index>(i)) =
+            (1.0 - weights[v]) * own + (weights[v] * kept / count) * sum;
       }
       for (std::size_t i = 0; i < moving.size(); ++i)
         added.row(moving[i]) = smooth.row(static_cast<Eigen::Index>(i));
     }
     for (const int v : moving) x.row(v) = plain.row(v) + added.row(v);
   }
+  Mended mended;
   double all = 0.0;
-  for (std::size_t v = 0; v < weights.size(); ++v) {
+  for (std::size_t v = 0; v < best_weights.size(); ++v) {
     all += area_[v];
-    if (weights[v] == 0.0) continue;
+    if (best_weights[v] == 0.0) continue;
     mended.area += area_[v];
-    const double way = (x.row(static_cast<Eigen::Index>(v)) - skin.row(static_cast<Eigen::Index>(v))).norm();
+    const double way =
+        (best.row(static_cast<Eigen::Index>(v)) - skin.row(static_cast<Eigen::Index>(v))).norm();
     if (way >= mended.largest) mended.largest = way, mended.vertex = static_cast<int>(v);
   }
   if (all > 0.0) mended.area /= all;
-  skin = std::move(x);
+  skin = std::move(best);
   return mended;
 }
 

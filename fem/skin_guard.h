@@ -23,9 +23,9 @@ struct Mended {
 ///   d_v = (1 - w_v) d_v^0 + w_v mean of d over the neighbours,
 /// with w rising from 0 to 1 where triangles are stretched, squeezed or turned over, or the skin is creased,
 /// against plain skinning and against rest, and fading over three rings (harmonic in the middle; smoothing
-/// what deformation adds is [Mancewicz14]'s idea). Where the skin is whole nothing changes, so rigid motion,
-/// and flesh that lags behind without tearing, stay as they are to the last bit. w is a continuous function
-/// of the places: nothing pops.
+/// what deformation adds is [Mancewicz14]'s idea). What is still wrong then is laid on plain skinning. Where
+/// the skin is whole nothing changes, so rigid motion, and flesh that lags behind without tearing, stay as
+/// they are to the last bit. w is a continuous function of the places: nothing pops.
 class SkinGuard {
  public:
   /// rest: num_vertices x 3; triangles of it, vertices that belong together welded. Throws
@@ -39,7 +39,7 @@ class SkinGuard {
  private:
   struct Side;
   std::vector<double> faults(const lattice::Points& skin, const Side& plain) const;
-  void spread(std::vector<double>& weights) const;
+  void spread(std::vector<double>& weights, int rings) const;
 
   /// First fundamental form of a triangle: a.a, a.b, b.b of its edges.
   struct Form {

@@ -231,16 +231,20 @@ void say_what_was_mended(const Character& character, const std::vector<FrameRepo
   const lattice::Surface& surface = character.input.skin.surface;
   const int joint = lattice::skin_frame(surface.weights[static_cast<std::size_t>(most->mended.vertex)],
                                         character.lattice.lattice.frame_of_joint);
+  const double widest =
+      std::max_element(frames.begin(), frames.end(), [](const FrameReport& a, const FrameReport& b) {
+        return a.mended.area < b.mended.area;
+      })->mended.area;
+  const double way = most->mended.largest / character.rig.height;
+  // A tenth of the height is more than flesh swings by: there is none to be seen any more.
+  const bool much = way > 0.1;
   talk(fmt::format(
-      "mended up to {:.2g} % of the skin, where cells are too coarse for it, by at most {:.2g} % of the "
+      "{}mended up to {:.2g} % of the skin, where cells are too coarse for it, by at most {:.2g} % of the "
       "height: "
-      "frame {} at '{}'; --guard off leaves it",
-      100.0 * std::max_element(
-                  frames.begin(), frames.end(),
-                  [](const FrameReport& a, const FrameReport& b) { return a.mended.area < b.mended.area; })
-                  ->mended.area,
-      100.0 * most->mended.largest / character.rig.height, most->frame,
-      joint < 0 ? std::string("the body") : character.input.joints.names[static_cast<std::size_t>(joint)]));
+      "frame {} at '{}'; {}--guard off leaves it",
+      much ? "warning: " : "", 100.0 * widest, 100.0 * way, most->frame,
+      joint < 0 ? std::string("the body") : character.input.joints.names[static_cast<std::size_t>(joint)],
+      much ? "hint: more --cells or stiffer flesh (--young) keep more of its motion; " : ""));
 }
 
 /// The verdict on the frames of the report, which is thrown where it is strict and bad.

@@ -1,5 +1,6 @@
 #include "fem/skin_guard.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -91,6 +92,34 @@ TEST(SkinGuard, SpreadsATear) {
   guard.mend(sheet.points, skin);
   EXPECT_NEAR(before, std::hypot(7.0, 1.0), 1e-12);  // a diagonal
   EXPECT_LE(longest_edge(sheet, skin), 2.5);         // where an eye begins to call skin torn
+}
+
+// Plain skinning squeezes a band to a twentieth, and flesh adds a ripple that turns its triangles over. No
+// smoothness helps there: what is left of the ripple would do.
+TEST(SkinGuard, LaysSkinOnPlainSkinningThatCollapses) {
+  const Sheet sheet(24);
+  const SkinGuard guard(sheet.points, sheet.triangles);
+  Points plain = sheet.points;
+  for (Eigen::Index v = 0; v < plain.rows(); ++v) {
+    const double x = plain(v, 0), band = std::clamp(x - 10.0, 0.0, 4.0);
+    plain(v, 0) = x - 0.95 * band;
+  }
+  Points skin = plain;
+  for (Eigen::Index v = 0; v < skin.rows(); ++v)
+    skin(v, 0) -= 0.4 * std::sin(0.5 * sheet.points(v, 0)) * std::cos(0.3 * sheet.points(v, 1));
+  const auto turned_over = [&](const Points& x) {
+    int count = 0;
+    for (Eigen::Index t = 0; t < sheet.triangles.rows(); ++t) {
+      const Eigen::Vector3d a = x.row(sheet.triangles(t, 0)), b = x.row(sheet.triangles(t, 1)),
+                            c = x.row(sheet.triangles(t, 2));
+      count += (b - a).cross(c - a).z() < 0.0;
+    }
+    return count;
+  };
+  EXPECT_GT(turned_over(skin), 20);
+  guard.mend(plain, skin);
+  EXPECT_EQ(turned_over(skin), 0);
+  EXPECT_GT((skin - plain).cwiseAbs().maxCoeff(), 0.3);  // far from the band the ripple stays
 }
 
 TEST(SkinGuard, DoesNotPop) {
