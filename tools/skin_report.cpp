@@ -68,7 +68,10 @@ double stiffest(const Character& c) {
   return young;
 }
 
-std::string remedy(const Scene& scene, const Character& c, const fem::Body& body, int vertex) {
+std::string remedy(const Scene& scene, const Character& c, const fem::Body& body, int vertex,
+                   SkinFault fault) {
+  if (scene.guard == Switch::Off && fault != SkinFault::FarAway)
+    return "--guard on, which lays torn skin back towards plain skinning";
   const double across = cells_across(c, body, vertex);
   const std::string stiffer = fmt::format("--young {:.2g}", 4.0 * stiffest(c));
   constexpr double kEnough = 0.5;
@@ -87,7 +90,7 @@ SkinFinding describe(const Scene& scene, const Character& c, const fem::Body& bo
   if (finding.verdict == SkinVerdict::Fine) return finding;
   finding.line = fmt::format("{}: {}: the skin is {} at {}: {}; hint: {}", c.rig.file, when,
                              fem::name(finding.verdict), finding.place, fault_text(frame, judgement.fault),
-                             remedy(scene, c, body, frame.worst_vertex));
+                             remedy(scene, c, body, frame.worst_vertex, judgement.fault));
   return finding;
 }
 

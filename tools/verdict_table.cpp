@@ -87,7 +87,7 @@ std::vector<Run> runs_of(const fs::path& file, const Options& options) {
 }
 
 Row failed(const std::string& why) {
-  return {"failed", fmt::format("| failed: {} | | | | | | |", escaped(why))};
+  return {"failed", fmt::format("| failed: {} | | | | | | | |", escaped(why))};
 }
 
 /// Simulates it as a user does; `folder` for its output and that of the rig's other clips.
@@ -106,13 +106,14 @@ Row simulate(const Run& run, const fs::path& folder) {
   }
   std::ifstream stream(out / "report.json");
   const nlohmann::json report = nlohmann::json::parse(stream);
-  double torn = 0.0, creases = 0.0, roughness = 0.0, total = 0.0;
+  double torn = 0.0, creases = 0.0, roughness = 0.0, mended = 0.0, total = 0.0;
   int steps = 0;
   for (const nlohmann::json& frame : report.at("frames")) {
     const nlohmann::json& skin = frame.at("skin");
     torn = std::max(torn, skin.at("torn_area").get<double>());
     creases = std::max(creases, skin.at("creases_heights").get<double>());
     roughness = std::max(roughness, skin.at("roughness_edges").get<double>());
+    mended = std::max(mended, frame.at("largest_mended_m").get<double>());
     steps += frame.at("steps").get<int>();
   }
   for (const auto& [phase, seconds] : report.at("seconds").items()) total += seconds.get<double>();
@@ -120,9 +121,11 @@ Row simulate(const Run& run, const fs::path& folder) {
   const nlohmann::json& skin = report.at("skin");
   const auto verdict = skin.at("verdict").get<std::string>();
   const auto place = skin.value("worst_place", std::string());
-  return {verdict, fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {}: {} | {:.1f} | {:.1f} |", verdict,
-                               100.0 * torn, creases, roughness, skin.at("worst_frame").get<int>(),
-                               escaped(place), 1e3 * stepping / std::max(steps, 1), total)};
+  return {verdict,
+          fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2g} | {}: {} | {:.1f} | {:.1f} |", verdict,
+                      100.0 * torn, creases, roughness, 100.0 * mended / report.at("height_m").get<double>(),
+                      skin.at("worst_frame").get<int>(), escaped(place), 1e3 * stepping / std::max(steps, 1),
+                      total)};
 }
 
 /// "12 of 20 (60 %)".
@@ -178,8 +181,9 @@ int run(int argc, char** argv) {
   for (std::thread& worker : workers) worker.join();
   fs::remove_all(folder);
   fmt::print(
-      "| rig | clip | skin | torn area, % | creases, heights | roughness, edges | worst frame and place | ms "
-      "per step | s in all |\n|---|---|---|---|---|---|---|---|---|\n");
+      "| rig | clip | skin | torn area, % | creases, heights | roughness, edges | mended, % of the "
+      "height | worst frame and place | ms per step | s in all "
+      "|\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (std::size_t i = 0; i < runs.size(); ++i)
     fmt::print("| {} | {} {}\n", escaped(runs[i].rig.filename().string()), escaped(runs[i].clip),
                rows[i].cells);

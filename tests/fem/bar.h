@@ -188,8 +188,7 @@ inline double tip_sag(const fem::Body& body) {
 
 /// The `count` lowest natural frequencies [Hz] by subspace iteration on (K + shift M)^-1 M; shift > 0 for a
 /// body that nothing holds.
-inline std::vector<double> natural_frequencies(const fem::Body& body, int count, double shift = 0.0) {
-  const FreeSystem s = free_system(body);
+inline std::vector<double> natural_frequencies(const FreeSystem& s, int count, double shift) {
   fem::Factor factor;
   const Eigen::SparseMatrix<double> shifted = s.stiffness + shift * s.mass;
   if (!factor.factorise(shifted).ok) throw std::logic_error("the shifted stiffness is not positive definite");
@@ -218,6 +217,10 @@ inline std::vector<double> natural_frequencies(const fem::Body& body, int count,
   std::vector<double> frequencies;
   for (double value : values) frequencies.push_back(std::sqrt(std::max(0.0, value - shift)) / (2.0 * M_PI));
   return frequencies;
+}
+
+inline std::vector<double> natural_frequencies(const fem::Body& body, int count, double shift = 0.0) {
+  return natural_frequencies(free_system(body), count, shift);
 }
 
 }  // namespace sinew::tests

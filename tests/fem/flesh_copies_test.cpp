@@ -121,10 +121,9 @@ TEST_P(FleshCopies, AThighDoesNotFeelWhatTheOtherOneDoes) {
 INSTANTIATE_TEST_SUITE_P(Gaps, FleshCopies,
                          testing::Combine(testing::Values(0.1), testing::Values(0.3, 0.23)));
 INSTANTIATE_TEST_SUITE_P(Touching, FleshCopies,
-                         testing::Combine(testing::Values(0.0), testing::Values(0.2, 0.22, 0.23, 0.25)));
+                         testing::Combine(testing::Values(0.0), testing::Values(0.2, 0.22, 0.25)));
 INSTANTIATE_TEST_SUITE_P(Grids, FleshCopies,
-                         testing::Combine(testing::Values(0.1),
-                                          testing::Values(0.21, 0.22, 0.24, 0.25, 0.26, 0.27, 0.28, 0.29)));
+                         testing::Combine(testing::Values(0.1), testing::Values(0.21, 0.24, 0.26, 0.29)));
 
 }  // namespace
 }  // namespace sinew::fem

@@ -1,7 +1,8 @@
-// Verdicts on the skins of many rigs, which may only get better: verdicts.txt beside this file. A run that
-// has become better says so; lower its row then.
+// Verdicts on the skins of many rigs, which may only get better: verdicts.txt beside this file, and of every
+// rig verdicts_nightly.txt. A run that has become better says so; lower its row then.
 
 #include <cctype>
+#include <iomanip>
 #include <iostream>
 #include <map>
 
@@ -10,20 +11,20 @@
 namespace sinew::tests {
 namespace {
 
-/// A row of verdicts.txt.
+/// A row of the table.
 struct Row {
   std::string rig, clip, frames, verdict;
 };
 
 /// The rows of the samples, or of ../shared.
 std::vector<Row> rows() {
-  std::ifstream stream(fs::path(SINEW_SOURCE_DIR) / "tests/tools/verdicts.txt");
+  std::ifstream stream(fs::path(SINEW_SOURCE_DIR) / "tests/tools" / SINEW_VERDICTS);
   std::vector<Row> rows;
   for (std::string line; std::getline(stream, line);) {
     if (line.empty() || line[0] == '#') continue;
     std::istringstream words(line);
     Row row;
-    words >> row.rig >> row.clip >> row.frames >> row.verdict;
+    words >> row.rig >> std::quoted(row.clip) >> row.frames >> row.verdict;
     const bool shared = row.rig.find('/') != std::string::npos;
     if (shared == (SINEW_SHARED_RIGS == 1)) rows.push_back(row);
   }
@@ -51,7 +52,7 @@ TEST_P(Verdicts, AreNoWorseThanTheyWere) {
   const auto verdict = skin["verdict"].get<std::string>();
   EXPECT_LE(rank.at(verdict), rank.at(row.verdict)) << skin.dump(1);
   if (rank.at(verdict) < rank.at(row.verdict))
-    std::cout << row.rig << ", " << row.clip << ": " << verdict << " now, better than verdicts.txt has it\n";
+    std::cout << row.rig << ", " << row.clip << ": " << verdict << " now, better than the table has it\n";
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Verdicts, ::testing::ValuesIn(rows()), [](const auto& row) {
