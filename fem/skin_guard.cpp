@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -29,11 +30,16 @@ constexpr std::pair kCrease{25.0 * std::numbers::pi / 180.0, 40.0 * std::numbers
 /// Cosine between a triangle and where the skin round it has turned plain skinning's.
 constexpr std::pair kFlip{0.5, -0.1};
 constexpr int kRings = 3, kIterations = 30;
+/// Edges longer than this bend by such angles where the skin is as smooth as they let it be.
+constexpr double kLongEdge = 0.1;  ///< of the skin's size at rest.
+constexpr double kReach = 0.1;  ///< of the skin's size at rest: three rings of a coarse skin are half of it.
 /// Laying one place back may crease its rim: so often is looked again, every second time three rings farther.
 /// Where plain skinning itself squeezes a triangle to next to nothing, the least difference that is left
 /// turns it over: what the first passes leave is drawn to plain skinning itself, from the eighth on all of
 /// it.
 constexpr int kPasses = 10, kSmoothPasses = 4, kPlainPass = 7;
+/// Of a fault that a pass leaves, what the next one minds: less than this no eye sees.
+constexpr std::pair kLeft{0.2, 0.6};
 
 double ramp(double x, const std::pair<double, double>& from_to) {
   return std::clamp((x - from_to.first) / (from_to.second - from_to.first), 0.0, 1.0);
@@ -77,6 +83,15 @@ SkinGuard::SkinGuard(const Points& rest, const lattice::Triangles& triangles)
   for (const std::vector<int>& row : neighbours) {
     neighbour_.insert(neighbour_.end(), row.begin(), row.end());
     row_start_.push_back(static_cast<int>(neighbour_.size()));
+  }
+  for (std::size_t v = 0; v < n; ++v)
+    for (const int w : neighbours[v])
+      edge_length_.push_back((point(rest, static_cast<int>(v)) - point(rest, w)).norm());
+  size_ = n > 0 ? (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm() : 0.0;
+  if (!edge_length_.empty()) {
+    const double mean = std::accumulate(edge_length_.begin(), edge_length_.end(), 0.0) /
+                        static_cast<double>(edge_length_.size());
+    coarseness_ = std::max(1.0, mean / (kLongEdge * size_));
   }
   rest_forms_ = forms(rest);
   rest_angles_ = angles(rest);
@@ -183,7 +198,8 @@ std::vector<double> SkinGuard::faults(const Points& skin, const Side& plain) con
       raise(triangles_(static_cast<Eigen::Index>(t), k), of_triangle[t]);
   const std::vector<double> now = angles(skin);
   for (std::size_t h = 0; h < hinges_.size(); ++h) {
-    const double fault = ramp(std::min(now[h] - plain.angles[h], now[h] - rest_angles_[h]), kCrease);
+    const double fault =
+        ramp(std::min(now[h] - plain.angles[h], now[h] - rest_angles_[h]) / coarseness_, kCrease);
     if (fault == 0.0) continue;
     raise(hinges_[h].vertex_a, fault);
     raise(hinges_[h].vertex_b, fault);
@@ -191,15 +207,16 @@ std::vector<double> SkinGuard::faults(const Points& skin, const Side& plain) con
   return result;
 }
 
-/// Lets weights fade, all the way to nothing, over so many rings round them.
-void SkinGuard::spread(std::vector<double>& weights, int rings) const {
-  const double step = 1.0 / (rings + 1.0);
+/// Lets weights fade, all the way to nothing, over so many rings round them, at most as far as `reach`.
+void SkinGuard::spread(std::vector<double>& weights, int rings, double reach) const {
   for (int ring = 0; ring < rings; ++ring) {
     const std::vector<double> before = weights;
     for (std::size_t v = 0; v < weights.size(); ++v)
-      for (int e = row_start_[v]; e < row_start_[v + 1]; ++e)
+      for (int e = row_start_[v]; e < row_start_[v + 1]; ++e) {
+        const double step = std::max(1.0 / (rings + 1.0), edge_length_[static_cast<std::size_t>(e)] / reach);
         weights[v] = std::max(
             weights[v], before[static_cast<std::size_t>(neighbour_[static_cast<std::size_t>(e)])] - step);
+      }
   }
 }
 
@@ -211,12 +228,14 @@ Mended SkinGuard::mend(const Points& plain, Points& skin) const {
   // The last look judges the last pass. What helps one place may harm another, so the best of all is kept.
   for (int pass = 0; pass <= kPasses; ++pass) {
     std::vector<double> found = faults(x, side);
+    if (pass > 0)
+      for (double& fault : found) fault = ramp(fault, kLeft);
     double wrong = 0.0;
     for (std::size_t v = 0; v < found.size(); ++v) wrong += area_[v] * found[v];
     if (wrong < least) least = wrong, best = x, best_weights = weights;
-    if (pass == kPasses || std::all_of(found.begin(), found.end(), [](double fault) { return fault < 1e-3; }))
-      break;
-    spread(found, kRings * (1 + pass / 2));
+    if (pass == kPasses || wrong == 0.0) break;
+    const int wider = 1 + pass / 2;
+    spread(found, kRings * wider, kReach * wider * size_);
     std::vector<int> moving;
     for (std::size_t v = 0; v < weights.size(); ++v) {
       weights[v] = std::max(weights[v], found[v]);

@@ -39,7 +39,7 @@ class SkinGuard {
  private:
   struct Side;
   std::vector<double> faults(const lattice::Points& skin, const Side& plain) const;
-  void spread(std::vector<double>& weights, int rings) const;
+  void spread(std::vector<double>& weights, int rings, double reach) const;
 
   /// First fundamental form of a triangle: a.a, a.b, b.b of its edges.
   struct Form {
@@ -59,6 +59,9 @@ class SkinGuard {
   };
   std::vector<Hinge> hinges_;
   std::vector<int> row_start_, neighbour_;  ///< of vertices, by edges.
+  std::vector<double> edge_length_;         ///< of every neighbour at rest.
+  double size_ = 0.0;                       ///< diagonal of the box at rest.
+  double coarseness_ = 1.0;                 ///< by which creases may be deeper.
   std::vector<double> area_;                ///< of vertices at rest, a third of each triangle.
   std::vector<Form> rest_forms_;
   std::vector<double> rest_angles_;
