@@ -30,7 +30,7 @@ struct TriangleSamples {
 TriangleSamples sample_triangles(const Points& points, const Triangles& triangles, double spacing);
 
 /// What an octant holds at least if the skin passes through it. Without it functions there would hold no mass
-/// at all; more of it would be mass that is not there (a bar one cell across gains 0.1 % by this).
+/// at all; more of it would be mass that is not there.
 inline constexpr double kGrazedFill = 1.0 / 64.0;
 
 /// Raises the fill of every octant that holds one of the `samples` of the skin to kGrazedFill; `may_hold` as
