@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -29,14 +28,16 @@ constexpr std::pair kStretch{1.9, 2.4}, kSqueeze{0.35, 0.22};
 constexpr std::pair kCrease{25.0 * std::numbers::pi / 180.0, 40.0 * std::numbers::pi / 180.0};
 /// Cosine between a triangle and where the skin round it has turned plain skinning's.
 constexpr std::pair kFlip{0.5, -0.1};
+/// Of the skin's size at rest: where mean edges are longer than this, they bend by such angles where the skin
+/// is as smooth as they let it be.
+constexpr double kLongEdge = 0.1;
 constexpr int kRings = 3, kIterations = 30;
-/// Edges longer than this bend by such angles where the skin is as smooth as they let it be.
-constexpr double kLongEdge = 0.1;  ///< of the skin's size at rest.
-constexpr double kReach = 0.1;  ///< of the skin's size at rest: three rings of a coarse skin are half of it.
+/// Of the skin's size at rest: no weight fades farther, for three rings of a coarse skin are half of it.
+constexpr double kReach = 0.1;
 /// Laying one place back may crease its rim: so often is looked again, every second time three rings farther.
 /// Where plain skinning itself squeezes a triangle to next to nothing, the least difference that is left
-/// turns it over: what the first passes leave is drawn to plain skinning itself, from the eighth on all of
-/// it.
+/// turns it over: what the first kSmoothPasses leave is drawn to plain skinning itself, from pass kPlainPass
+/// on all of it.
 constexpr int kPasses = 10, kSmoothPasses = 4, kPlainPass = 7;
 /// Of a fault that a pass leaves, what the next one minds: less than this no eye sees.
 constexpr std::pair kLeft{0.2, 0.6};
@@ -220,60 +221,69 @@ void SkinGuard::spread(std::vector<double>& weights, int rings, double reach) co
   }
 }
 
-Mended SkinGuard::mend(const Points& plain, Points& skin) const {
+/// d with every weight's share of its neighbours' mean.
+void SkinGuard::lay(const GuardWeights& by, const Points& plain, const Points& flesh, Points& skin) const {
+  std::vector<int> moving;
+  for (std::size_t v = 0; v < by.weights.size(); ++v)
+    if (by.weights[v] > 0.0) moving.push_back(static_cast<int>(v));
+  Points added = flesh - plain;  // d
+  Points smooth(static_cast<Eigen::Index>(moving.size()), 3);
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    for (std::size_t i = 0; i < moving.size(); ++i) {
+      const auto v = static_cast<std::size_t>(moving[i]);
+      Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+      for (int e = row_start_[v]; e < row_start_[v + 1]; ++e)
+        sum += added.row(neighbour_[static_cast<std::size_t>(e)]);
+      const double count = row_start_[v + 1] - row_start_[v];
+      const Eigen::RowVector3d own = flesh.row(moving[i]) - plain.row(moving[i]);
+      smooth.row(static_cast<Eigen::Index>(i)) =
+          (1.0 - by.weights[v]) * own + (by.weights[v] * (1.0 - by.pulls[v]) / count) * sum;
+    }
+    for (std::size_t i = 0; i < moving.size(); ++i)
+      added.row(moving[i]) = smooth.row(static_cast<Eigen::Index>(i));
+  }
+  for (const int v : moving) skin.row(v) = plain.row(v) + added.row(v);
+}
+
+GuardWeights SkinGuard::weigh(const Points& plain, const Points& flesh, const GuardWeights& from) const {
   const Side side{plain, forms(plain), angles(plain)};
-  std::vector<double> weights(area_.size(), 0.0), pulls = weights, best_weights = weights;
-  Points x = skin, best = skin;
-  double least = std::numeric_limits<double>::infinity();
-  // The last look judges the last pass. What helps one place may harm another, so the best of all is kept.
-  for (int pass = 0; pass <= kPasses; ++pass) {
+  GuardWeights result = from;
+  Points x = flesh;
+  if (!from.weights.empty()) lay(result, plain, flesh, x);
+  for (int pass = from.weights.empty() ? 0 : kSmoothPasses; pass < kPasses; ++pass) {
     std::vector<double> found = faults(x, side);
     if (pass > 0)
       for (double& fault : found) fault = ramp(fault, kLeft);
-    double wrong = 0.0;
-    for (std::size_t v = 0; v < found.size(); ++v) wrong += area_[v] * found[v];
-    if (wrong < least) least = wrong, best = x, best_weights = weights;
-    if (pass == kPasses || wrong == 0.0) break;
+    if (std::ranges::all_of(found, [](double fault) { return fault == 0.0; })) break;
     const int wider = 1 + pass / 2;
     spread(found, kRings * wider, kReach * wider * size_);
-    std::vector<int> moving;
-    for (std::size_t v = 0; v < weights.size(); ++v) {
-      weights[v] = std::max(weights[v], found[v]);
-      if (pass >= kSmoothPasses) pulls[v] = std::max(pulls[v], found[v]);
-      if (weights[v] > 0.0) moving.push_back(static_cast<int>(v));
+    const double pull = ramp(pass, {kSmoothPasses - 1.0, kPlainPass});
+    result.weights.resize(found.size(), 0.0);
+    result.pulls.resize(found.size(), 0.0);
+    for (std::size_t v = 0; v < found.size(); ++v) {
+      result.weights[v] = std::max(result.weights[v], found[v]);
+      result.pulls[v] = std::max(result.pulls[v], pull * found[v]);
     }
-    const double keep =
-        1.0 - ramp(pass, {static_cast<double>(kSmoothPasses - 1), static_cast<double>(kPlainPass)});
-    Points added = skin - plain;  // d
-    Points smooth(static_cast<Eigen::Index>(moving.size()), 3);
-    for (int iteration = 0; iteration < kIterations; ++iteration) {
-      for (std::size_t i = 0; i < moving.size(); ++i) {
-        const auto v = static_cast<std::size_t>(moving[i]);
-        Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-        for (int e = row_start_[v]; e < row_start_[v + 1]; ++e)
-          sum += added.row(neighbour_[static_cast<std::size_t>(e)]);
-        const double count = row_start_[v + 1] - row_start_[v], kept = 1.0 - (1.0 - keep) * pulls[v];
-        const Eigen::RowVector3d own = skin.row(moving[i]) - plain.row(moving[i]);
-        smooth.row(static_cast<Eigen::Index>(i)) =
-            (1.0 - weights[v]) * own + (weights[v] * kept / count) * sum;
-      }
-      for (std::size_t i = 0; i < moving.size(); ++i)
-        added.row(moving[i]) = smooth.row(static_cast<Eigen::Index>(i));
-    }
-    for (const int v : moving) x.row(v) = plain.row(v) + added.row(v);
+    lay(result, plain, flesh, x);
   }
+  return result;
+}
+
+Mended SkinGuard::mend(const GuardWeights& by, const Points& plain, Points& skin) const {
   Mended mended;
+  if (by.weights.empty()) return mended;
+  const Points flesh = skin;
+  lay(by, plain, flesh, skin);
   double all = 0.0;
-  for (std::size_t v = 0; v < best_weights.size(); ++v) {
+  for (std::size_t v = 0; v < by.weights.size(); ++v) {
     all += area_[v];
-    if (best_weights[v] == 0.0) continue;
+    if (by.weights[v] == 0.0) continue;
     mended.area += area_[v];
     const double way =
-        (best.row(static_cast<Eigen::Index>(v)) - skin.row(static_cast<Eigen::Index>(v))).norm();
+        (skin.row(static_cast<Eigen::Index>(v)) - flesh.row(static_cast<Eigen::Index>(v))).norm();
     if (way >= mended.largest) mended.largest = way, mended.vertex = static_cast<int>(v);
   }
   if (all > 0.0) mended.area /= all;
-  skin = std::move(best);
   return mended;
 }
 

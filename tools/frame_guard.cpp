@@ -1,38 +1,70 @@
 #include "tools/frame_guard.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace sinew::tools {
 
 using lattice::Points;
 
 namespace {
 
+/// Weights rise and fall over this time on either side of a frame [s]: three frames of 30 a second. At 240
+/// frames a second guarded skin jerks at most 1.7 times as much as the flesh itself then; laid back frame by
+/// frame ten times.
+constexpr double kSteadyTime = 0.1;
+
+/// At most so many frames: what is looked at at once is kept in memory.
+constexpr int kMostFrames = 24;
+
 /// Action: (row of the rig's vertices, vertex of the welded skin).
 template <class Action>
-void each_flesh_vertex(const std::vector<int>& surface_of_vertex, const Action& action) {
-  for (std::size_t i = 0; i < surface_of_vertex.size(); ++i)
-    if (surface_of_vertex[i] >= 0) action(static_cast<Eigen::Index>(i), surface_of_vertex[i]);
+void each_flesh_vertex(const assets::PhysicsSkin& skin, const Action& action) {
+  for (std::size_t i = 0; i < skin.surface_of_vertex.size(); ++i)
+    if (skin.surface_of_vertex[i] >= 0) action(static_cast<Eigen::Index>(i), skin.surface_of_vertex[i]);
+}
+
+Points welded(const assets::PhysicsSkin& skin, const Points& of_rig) {
+  Points result(skin.surface.points.rows(), 3);
+  each_flesh_vertex(skin, [&](Eigen::Index row, int vertex) { result.row(vertex) = of_rig.row(row); });
+  return result;
+}
+
+/// Mend: (plain skinning, flesh to be changed), both of the welded skin.
+template <class Mend>
+fem::Mended mend_welded(const assets::PhysicsSkin& skin, const Points& skinned, Points& simulated,
+                        const Mend& mend) {
+  Points flesh = welded(skin, simulated);
+  const fem::Mended mended = mend(welded(skin, skinned), flesh);
+  if (mended.vertex >= 0)
+    each_flesh_vertex(skin, [&](Eigen::Index row, int vertex) { simulated.row(row) = flesh.row(vertex); });
+  return mended;
 }
 
 }  // namespace
 
-FrameGuard::FrameGuard(const Scene& scene, const Character& character) : skin_(&character.input.skin) {
-  const lattice::Surface& surface = skin_->surface;
-  if (scene.guard == Switch::On && !scene.plain) guard_.emplace(surface.points, surface.triangles);
+FrameGuard::FrameGuard(const Scene& scene, const Character& character, double fps)
+    : skin_(&character.input.skin) {
+  if (scene.guard != Switch::On || scene.plain) return;
+  guard_ = std::make_unique<const fem::SkinGuard>(skin_->surface.points, skin_->surface.triangles);
+  const int reach = static_cast<int>(std::min<double>(std::round(kSteadyTime * fps), kMostFrames));
+  steady_ = std::make_unique<fem::SteadyGuard>(*guard_, reach);
+}
+
+void FrameGuard::see(const Points& skinned, const Points& simulated) {
+  if (steady_) steady_->see(welded(*skin_, skinned), welded(*skin_, simulated));
+}
+
+fem::Mended FrameGuard::mend_next(const Points& skinned, Points& simulated) {
+  if (!steady_) return {};
+  return mend_welded(*skin_, skinned, simulated,
+                     [&](const Points& plain, Points& flesh) { return steady_->mend_next(plain, flesh); });
 }
 
 fem::Mended FrameGuard::mend(const Points& skinned, Points& simulated) const {
   if (!guard_) return {};
-  Points flesh(skin_->surface.points.rows(), 3), plain(flesh.rows(), 3);
-  each_flesh_vertex(skin_->surface_of_vertex, [&](Eigen::Index row, int vertex) {
-    flesh.row(vertex) = simulated.row(row);
-    plain.row(vertex) = skinned.row(row);
-  });
-  const fem::Mended mended = guard_->mend(plain, flesh);
-  if (mended.vertex >= 0) {
-    each_flesh_vertex(skin_->surface_of_vertex,
-                      [&](Eigen::Index row, int vertex) { simulated.row(row) = flesh.row(vertex); });
-  }
-  return mended;
+  return mend_welded(*skin_, skinned, simulated,
+                     [&](const Points& plain, Points& flesh) { return guard_->mend(plain, flesh); });
 }
 
 }  // namespace sinew::tools

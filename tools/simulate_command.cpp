@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -272,17 +273,46 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
   std::vector<assets::PreviewFrame> preview;
   FrameJudge judge(scene, character, frames);
   assets::Pc2Writer writer(cache, static_cast<int>(layout.rig_vertex.size()), frames.first);
-  const FrameGuard guard(scene, character);
+  FrameGuard guard(scene, character, scene.fps);
   const assets::PropMotion props(character.rig);
   std::optional<OffsetFlesh> offset;
   if (scene.offset.value_or(0.0) != 0.0) offset.emplace(*scene.offset, character, simulation, options);
   Progress progress("simulating", count);
+  // Frames that the guard has seen and not mended.
+  struct Pending {
+    CharacterFrame frame;
+    std::vector<Eigen::Affine3d> pose;
+    FrameReport report;
+  };
+  std::deque<Pending> pending;
+  int written = 0;
+  const auto write_first = [&] {
+    auto& [frame, pose, f] = pending.front();
+    f.mended = guard.mend_next(frame.skinned, frame.simulated);
+    props.place(pose, frame.skinned, frame.simulated);
+    if (written == 0) talk(distance_line(character.rig, frame, f.frame));
+    try {
+      writer.write(layout.apply(frame.simulated));
+    } catch (const std::domain_error& error) {
+      throw NumericalError(
+          fmt::format("{}: frame {} at {:.6g} s: {}", character.rig.file, f.frame, f.time, error.what()));
+    }
+    f.skin = judge.measure(frame.simulated, frame.skinned,
+                           written == 0 ? fem::FrameKind::First : fem::FrameKind::Later);
+    report.frames.push_back(f);
+    if (std::find(shown.begin(), shown.end(), written) != shown.end()) {
+      preview.push_back(
+          {f.frame, f.time, frame.simulated, frame.skinned, posed_bones(character.lattice.lattice, pose)});
+    }
+    pending.pop_front();
+    progress.update(++written);
+  };
   for (int k = 0; k < count; ++k) {
     const int number = frames.first + k;
     const double time = t0 + number / scene.fps;
     const fem::SimulationReport step = simulation.advance_to(time);
     if (step.status != fem::SimulationStatus::Ok) fail(character, step, fmt::format("frame {}", number));
-    const std::vector<Eigen::Affine3d> pose = character.pose(time);
+    std::vector<Eigen::Affine3d> pose = character.pose(time);
     const Points surface = simulation.skin_of(simulation.positions_at(time));
     CharacterFrame frame = frame_at(character, pose, surface);
     if (offset) {
@@ -290,30 +320,16 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
     } else if (scene.offset) {
       frame.simulated = frame.skinned;
     }
-    const fem::Mended mended = guard.mend(frame.skinned, frame.simulated);
-    props.place(pose, frame.skinned, frame.simulated);
-    if (k == 0) talk(distance_line(character.rig, frame, number));
-    try {
-      writer.write(layout.apply(frame.simulated));
-    } catch (const std::domain_error& error) {
-      throw NumericalError(
-          fmt::format("{}: frame {} at {:.6g} s: {}", character.rig.file, number, time, error.what()));
-    }
+    guard.see(frame.skinned, frame.simulated);
     FrameReport f;
     f.frame = number;
     f.time = time;
     f.steps = step.steps;
     f.measures = simulation.measures_at(time);
-    f.mended = mended;
-    f.skin =
-        judge.measure(frame.simulated, frame.skinned, k == 0 ? fem::FrameKind::First : fem::FrameKind::Later);
-    report.frames.push_back(f);
-    if (std::find(shown.begin(), shown.end(), k) != shown.end()) {
-      preview.push_back(
-          {number, time, frame.simulated, frame.skinned, posed_bones(character.lattice.lattice, pose)});
-    }
-    progress.update(k + 1);
+    pending.push_back({std::move(frame), std::move(pose), f});
+    while (static_cast<int>(pending.size()) > guard.lookahead()) write_first();
   }
+  while (!pending.empty()) write_first();
   writer.finish();
   report.judging = judge.seconds();
   return preview;

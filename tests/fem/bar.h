@@ -138,6 +138,30 @@ inline Eigen::SparseMatrix<double> picked(const Eigen::SparseMatrix<double>& m,
   return pick.transpose() * (m * pick);
 }
 
+/// K, ties in it, and M of the leaf vertices' values, dof 3 i + c of the i-th vertex that is not held. Unlike
+/// the functions of two levels these are as many as cut cells have.
+inline FreeSystem nodal_system(const fem::LeafMatrices& of, const std::vector<std::uint8_t>& held) {
+  std::vector<int> row(held.size(), -1);
+  int count = 0;
+  for (std::size_t a = 0; a < held.size(); ++a)
+    if (!held[a]) row[a] = count++;
+  std::vector<Eigen::Triplet<double>> stiffness, mass;
+  for (int a = 0; a < of.num_vertices(); ++a)
+    for (int e = of.row_start[a]; e < of.row_start[a + 1]; ++e) {
+      const int i = row[a], k = row[of.column[e]];
+      for (int c = 0; i >= 0 && k >= 0 && c < 3; ++c) {
+        mass.emplace_back(3 * i + c, 3 * k + c, of.mass[e]);
+        for (int d = 0; d < 3; ++d)
+          stiffness.emplace_back(3 * i + c, 3 * k + d, of.stiffness[e](c, d) + (c == d ? of.tie[e] : 0.0));
+      }
+    }
+  FreeSystem s;
+  for (Eigen::SparseMatrix<double>* matrix : {&s.stiffness, &s.mass}) matrix->resize(3 * count, 3 * count);
+  s.stiffness.setFromTriplets(stiffness.begin(), stiffness.end());
+  s.mass.setFromTriplets(mass.begin(), mass.end());
+  return s;
+}
+
 inline FreeSystem free_system(const fem::Body& body) {
   FreeSystem s;
   for (int f = 0; f < body.mesh.num_functions(); ++f) {

@@ -80,19 +80,7 @@ Immersed immersed(int across, const Eigen::Affine3d& place) {
     return static_cast<double>(factor.num_nonzeros());
   };
   result.more_entries = entries(matrices) / entries(assemble(mesh, materials, kept, {0.0, 0.0}));
-  // Unknowns are the values at leaf vertices: functions of both levels are more than those of a cut cell.
-  std::vector<Eigen::Triplet<double>> stiffness, mass;
-  for (int row = 0; row < matrices.num_vertices(); ++row)
-    for (int e = matrices.row_start[row]; e < matrices.row_start[row + 1]; ++e)
-      for (int i = 0; i < 3; ++i) {
-        mass.emplace_back(3 * row + i, 3 * matrices.column[e] + i, matrices.mass[e]);
-        for (int k = 0; k < 3; ++k)
-          stiffness.emplace_back(3 * row + i, 3 * matrices.column[e] + k, matrices.stiffness[e](i, k));
-      }
-  for (Eigen::SparseMatrix<double>* m : {&result.system.stiffness, &result.system.mass})
-    m->resize(3 * matrices.num_vertices(), 3 * matrices.num_vertices());
-  result.system.stiffness.setFromTriplets(stiffness.begin(), stiffness.end());
-  result.system.mass.setFromTriplets(mass.begin(), mass.end());
+  result.system = tests::nodal_system(matrices, std::vector<std::uint8_t>(matrices.num_vertices(), 0));
   result.mass = apply_mass(matrices, Points::Ones(mesh.num_vertices(), 3)).col(0).sum();
   return result;
 }

@@ -37,31 +37,8 @@ double swing(double size) {
     options.materials.push_back({of_joint.joint, {of_joint.young, flesh.base.poisson, flesh.base.density}});
   const lattice::BuildResult built = lattice::build(character.skin, character.joints, {.cells = 200});
   const Body body = make_body({built.lattice, character.skin, skeleton, still}, options);
-  // Unknowns are the values at the leaf vertices that no bone holds. Ties keep flesh from turning round its
-  // bone.
-  std::vector<int> row(static_cast<std::size_t>(body.mesh.num_vertices()), -1);
-  int count = 0;
-  for (int a = 0; a < body.mesh.num_vertices(); ++a)
-    if (!body.bones.is_bone[static_cast<std::size_t>(a)]) row[static_cast<std::size_t>(a)] = count++;
-  std::vector<Eigen::Triplet<double>> stiffness, mass;
-  const LeafMatrices& m = body.matrices;
-  for (int a = 0; a < m.num_vertices(); ++a)
-    for (int e = m.row_start[static_cast<std::size_t>(a)]; e < m.row_start[static_cast<std::size_t>(a) + 1];
-         ++e) {
-      const auto entry = static_cast<std::size_t>(e);
-      const int i = row[static_cast<std::size_t>(a)], k = row[static_cast<std::size_t>(m.column[entry])];
-      for (int c = 0; i >= 0 && k >= 0 && c < 9; ++c) {
-        stiffness.emplace_back(3 * i + c / 3, 3 * k + c % 3,
-                               m.stiffness[entry](c / 3, c % 3) + (c / 3 == c % 3 ? m.tie[entry] : 0.0));
-        if (c / 3 == c % 3) mass.emplace_back(3 * i + c / 3, 3 * k + c / 3, m.mass[entry]);
-      }
-    }
-  tests::FreeSystem system;
-  for (Eigen::SparseMatrix<double>* matrix : {&system.stiffness, &system.mass})
-    matrix->resize(3 * count, 3 * count);
-  system.stiffness.setFromTriplets(stiffness.begin(), stiffness.end());
-  system.mass.setFromTriplets(mass.begin(), mass.end());
-  return tests::natural_frequencies(system, 1, 1.0)[0];
+  // Ties keep flesh from turning round its bone.
+  return tests::natural_frequencies(tests::nodal_system(body.matrices, body.bones.is_bone), 1, 1.0)[0];
 }
 
 // Flesh of a character of 1.8 m is meant to swing at 4 to 8 Hz, of larger ones by the root of their size: at

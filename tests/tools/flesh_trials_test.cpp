@@ -91,13 +91,15 @@ TEST_F(FleshTrials, TheNumberOfJointsInAChainMattersNotToTheMaterial) {
   EXPECT_LE(*most, 1.1 * *least);
 }
 
-// Plain skinning keeps 0.91 and 0.78 of it.
+// Measured: 0.97 and 0.88 of it; plain skinning keeps 0.91 and 0.78.
 TEST_F(FleshTrials, ABentAndATwistedLimbKeepTheirVolume) {
-  for (const char* name : {"elbow120", "twist180"}) {
+  for (const auto& [name, least] : {std::pair{"elbow120", 0.95}, std::pair{"twist180", 0.85}}) {
     const Frames flesh = frames_of("flesh/" + std::string(name) + ".glb", name, "--cells 400");
     const double first = volume(flesh[0], name);
-    for (std::size_t k = 0; k < flesh.size(); ++k)
-      EXPECT_NEAR(volume(flesh[k], name) / first, 1.0, 0.15) << name << ", frame " << k;
+    for (std::size_t k = 0; k < flesh.size(); ++k) {
+      EXPECT_GE(volume(flesh[k], name) / first, least) << name << ", frame " << k;
+      EXPECT_LE(volume(flesh[k], name) / first, 1.05) << name << ", frame " << k;
+    }
   }
 }
 

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <deque>
+#include <vector>
+
+#include "fem/skin_guard.h"
+#include "fem/steady_weights.h"
+
+/// The skin guard for frames in a row.
+namespace sinew::fem {
+
+/// What one frame asks of SkinGuard is nothing to the next, so skin that is laid back frame by frame pops.
+/// Here weights fade in before the frame that needs them and out after it (SteadyWeights). Weights that are
+/// on their way leave rims of their own, so what the first look leaves is looked for once more, and what that
+/// adds is made steady in the same way: weights of a frame depend on `lookahead` frames on either side.
+class SteadyGuard {
+ public:
+  /// `guard` must outlive it. `reach`: frames over which weights rise and fall; >= 0, 0: each by itself.
+  SteadyGuard(const SkinGuard& guard, int reach) : guard_(&guard), looks_(kLooks, Look(reach)) {}
+
+  /// How many frames must be seen after one before it can be mended, unless none will follow.
+  int lookahead() const { return kLooks * looks_.front().weights.lookahead(); }
+  /// The next frame as the flesh has it; as SkinGuard::weigh.
+  void see(const lattice::Points& plain, const lattice::Points& flesh);
+  /// The first frame that was seen and not mended: the same places as it was seen with.
+  Mended mend_next(const lattice::Points& plain, lattice::Points& skin);
+
+ private:
+  static constexpr int kLooks = 2;  ///< a third one changes no verdict on the rigs that were tried.
+  struct Frame {
+    lattice::Points plain, flesh;
+    GuardWeights by;  ///< what the looks so far have found.
+  };
+  struct Look {
+    explicit Look(int reach) : weights(reach), pulls(reach) {}
+    SteadyWeights weights, pulls;
+    std::deque<Frame> frames;  ///< whose weights this look has not made steady.
+  };
+  void look(std::size_t number, Frame frame);
+  Frame pass_on(std::size_t number);
+
+  const SkinGuard* guard_;
+  std::vector<Look> looks_;
+};
+
+}  // namespace sinew::fem
