@@ -24,7 +24,7 @@ struct GhostPenalty {
   double strength = 0.01;
   /// Faces count where one of their cells is filled less than this [-]. Cut cells that hold more are held by
   /// their own flesh.
-  double below = 0.3;
+  double below = 0.1;
 };
 
 /// A face of two leaf cells on which the penalty acts.

@@ -109,8 +109,7 @@ TEST_P(ImmersedBar, SwingsLikeTheFreeBar) {
     // Six rigid motions, then bending twice, torsion, second bending twice; shifted near those sought.
     const std::vector<double> f = tests::natural_frequencies(bar.system, 11, 100.0);
     EXPECT_NEAR(bar.mass, kMass, 0.01 * kMass);
-    // Most cells of these bars are cut; measured up to 1.76.
-    EXPECT_LE(bar.more_entries, 1.8);
+    EXPECT_LE(bar.more_entries, 1.7);  // measured up to 1.66
     for (int k = 0; k < 6; ++k) EXPECT_LT(f[k], 1e-3 * kBending);
     EXPECT_NEAR(f[6], kBending, bending * kBending);
     EXPECT_NEAR(f[8], kTorsion, torsion * kTorsion);
@@ -119,11 +118,11 @@ TEST_P(ImmersedBar, SwingsLikeTheFreeBar) {
   }
 }
 
-// Measured: bending 6.8, 1.7 and 0.7 %, torsion 8.3, 2.9 and 1.4 %; without the ghost penalty 4.6, 1.4 and
-// 0.5 %, 5.6, 2.3 and 1.2 %. A penalty of a tenth gives half of that back, for steps that take 1.4 times as
-// long.
+// Measured: bending 6.4, 1.6 and 0.7 %, torsion 8.0, 2.8 and 1.3 %; without the ghost penalty 4.6, 1.4 and
+// 0.5 %, 5.6, 2.3 and 1.2 %. A penalty of three tenths would give half of that back, for steps of
+// `blended-stiffness` that take up to 1.4 times as long as without any (with this one up to 1.2 times).
 INSTANTIATE_TEST_SUITE_P(CellsAcross, ImmersedBar,
-                         testing::Values(Bounds{1, 0.07, 0.09}, Bounds{2, 0.02, 0.03},
+                         testing::Values(Bounds{1, 0.065, 0.09}, Bounds{2, 0.02, 0.03},
                                          Bounds{3, 0.01, 0.015}));
 
 }  // namespace
