@@ -11,6 +11,10 @@ namespace {
 /// Rounding of an angle between two rotations [rad]: partners in a mirrored motion must be judged alike, and
 /// clips like round angles.
 constexpr double kAngleRounding = 1e-9;
+/// A vertex belongs to frame f by s_f^kSharpness over that of its dominant frame, less kSmallest. With 1 the
+/// regions of a character overlap so much that its factors are up to 2.6 times as large; with 4 at most 1.3
+/// times as with a single owner, and creases are up to a fifth shorter than with that.
+constexpr double kSharpness = 4.0, kSmallest = 0.1;
 
 }  // namespace
 
@@ -176,24 +180,34 @@ std::vector<Region> make_regions(const lattice::ControlLattice& lattice, const F
     joints.push_back(joint);
   }
 
-  const std::vector<int> owners = dominant_frames(weights);
+  // w of a vertex at x that frame `owner` has alone, times `share`.
+  const auto add_owned = [&](std::vector<double>& w, int owner, const Eigen::Vector3d& x, double share) {
+    std::vector<std::pair<int, double>> parts;
+    double own = 1.0;  // product of the owner's shares over its joints
+    for (const int j : joints_of_frame[static_cast<std::size_t>(owner)]) {
+      const Joint& joint = joints[static_cast<std::size_t>(j)];
+      const bool parent = joint.parent == owner;
+      const Shares shares = shares_of(joint, x, parent);
+      own *= parent ? shares.parent : shares.child;
+      parts.emplace_back(leader(parent ? joint.child : joint.parent), parent ? shares.child : shares.parent);
+      for (int k = 0; k < joint.num_regions; ++k)
+        parts.emplace_back(joint.first_region + k, shares.joints[static_cast<std::size_t>(k)]);
+    }
+    parts.emplace_back(leader(owner), own);
+    double sum = 0.0;
+    for (const auto& part : parts) sum += part.second;
+    for (const auto& [region, part] : parts) w[static_cast<std::size_t>(region)] += share * part / sum;
+  };
   std::vector<double> w(regions.size());
   for (int a = 0; a < mesh.num_vertices(); ++a) {
     std::fill(w.begin(), w.end(), 0.0);
-    const int owner = owners[static_cast<std::size_t>(a)];
-    double own = 1.0;  // product of the owner's shares over its joints
-    for (int j : joints_of_frame[static_cast<std::size_t>(owner)]) {
-      const Joint& joint = joints[static_cast<std::size_t>(j)];
-      const bool parent = joint.parent == owner;
-      const Shares shares = shares_of(joint, mesh.points.row(a).transpose(), parent);
-      own *= parent ? shares.parent : shares.child;
-      w[static_cast<std::size_t>(leader(parent ? joint.child : joint.parent))] +=
-          parent ? shares.child : shares.parent;
-      for (int k = 0; k < joint.num_regions; ++k) {
-        w[static_cast<std::size_t>(joint.first_region + k)] += shares.joints[static_cast<std::size_t>(k)];
-      }
+    // Off the joints, too, weights go over from one owner to the next without a jump.
+    double dominant = 0.0;
+    for (FrameWeights::InnerIterator s(weights, a); s; ++s) dominant = std::max(dominant, s.value());
+    for (FrameWeights::InnerIterator s(weights, a); s; ++s) {
+      const double share = std::pow(s.value() / dominant, kSharpness) - kSmallest;
+      if (share > 0.0) add_owned(w, static_cast<int>(s.col()), mesh.points.row(a).transpose(), share);
     }
-    w[static_cast<std::size_t>(leader(owner))] += own;
     double sum = 0.0;
     for (double& x : w) {
       if (x < 1e-9) x = 0.0;
