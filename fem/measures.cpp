@@ -13,6 +13,9 @@ namespace {
 
 /// Octants filled less hold hardly any flesh to strain or to turn inside out.
 constexpr double kFleshy = 0.5;
+/// Of its volume; where growth leaves less, no shape is free of strain: between a joint that a clip scales
+/// and one that it does not, it is turned inside out.
+constexpr double kLeastGrowth = 0.05;
 
 struct CellMeasure {
   double strain = 0.0;
@@ -81,7 +84,7 @@ CellMeasure measure_cell(const Body& body, std::size_t c, const lattice::Points&
     Eigen::Matrix3d gradient = at.from_rest;  // F, from what is free of strain
     if (grown != nullptr) gradient *= at.growth.inverse();
     const double fill = body.fill[c][static_cast<std::size_t>(at.index)];
-    if (fill >= kFleshy) {
+    if (fill >= kFleshy && at.growth.determinant() >= kLeastGrowth) {
       out.det = std::min(out.det, gradient.determinant());
       out.strain = std::max(out.strain, stretch_strain(gradient));
     }

@@ -137,7 +137,10 @@ int largest(const std::vector<double>& values) {
 /// asked for anew in every frame costs a quarter of the whole.
 class FrameMeasure {
  public:
-  explicit FrameMeasure(JudgedSkin skin) : skin_(std::move(skin)) {}
+  explicit FrameMeasure(JudgedSkin skin) : skin_(std::move(skin)) {
+    if (skin_.num_triangles() > 0)
+      volume_at_rest_ = volume(skin_.rest, skin_.triangles, skin_.rest.colwise().mean());
+  }
 
   SkinFrame measure(const Points& flesh, const Points& plain, FrameKind kind) {
     frame_ = {};
@@ -262,9 +265,10 @@ class FrameMeasure {
     Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
     for (int v : skin_.all) centre += plain.row(v);
     centre /= static_cast<double>(skin_.all.size());
-    const double before = volume(p_, skin_.triangles, centre);
-    if (std::abs(before) > 1e-9 * std::pow(skin_.height, 3))
-      frame_.volume_ratio = volume(x_, skin_.triangles, centre) / before;
+    const double now = volume(x_, skin_.triangles, centre), before = volume(p_, skin_.triangles, centre);
+    const double none = 1e-9 * std::pow(skin_.height, 3);
+    if (std::abs(before) > none) frame_.volume_ratio = now / before;
+    if (std::abs(volume_at_rest_) > none) frame_.volume_of_rest = now / volume_at_rest_;
   }
 
   /// The judged vertex with most of the fault round it.
@@ -294,6 +298,7 @@ class FrameMeasure {
   }
 
   JudgedSkin skin_;
+  double volume_at_rest_ = 0.0;  ///< [m^3].
   Points x_, p_, normal_x_, normal_p_;
   Rotations turn_, rest_turn_, buffer_;  ///< from plain skinning and from rest to flesh.
   std::vector<double> roughness_, away_;

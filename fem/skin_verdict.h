@@ -23,6 +23,7 @@ struct SkinFrame {
   double volume_ratio = 1.0;  ///< volume within the skin over that of plain skinning.
   /// Distance from plain skinning that 5 % and 1 % of the area exceed, and the largest [heights].
   double away_95 = 0.0, away_99 = 0.0, away_most = 0.0;
+  double volume_of_rest = 1.0;  ///< volume within the skin over that at rest.
   int worst_vertex = -1;     ///< of the input, where the fault is largest.
   int farthest_vertex = -1;  ///< of the input, where away_most is.
 };

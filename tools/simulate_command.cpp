@@ -240,12 +240,13 @@ void say_what_was_mended(const Character& character, const std::vector<FrameRepo
   // A tenth of the height is more than flesh swings by: there is none to be seen any more.
   const bool much = way > 0.1;
   talk(fmt::format(
-      "{}mended up to {:.2g} % of the skin, where cells are too coarse for it, by at most {:.2g} % of the "
-      "height: "
-      "frame {} at '{}'; {}--guard off leaves it",
+      "{}mended up to {:.3g} % of the skin, where cells are too coarse for it, by at most {:.3g} % of the "
+      "height: frame {} at '{}'; {}--guard off leaves it",
       much ? "warning: " : "", 100.0 * widest, 100.0 * way, most->frame,
       joint < 0 ? std::string("the body") : character.input.joints.names[static_cast<std::size_t>(joint)],
-      much ? "hint: more --cells or stiffer flesh (--young) keep more of its motion; " : ""));
+      much ? fmt::format("hint: --young {:.2g}, stiffer flesh, keeps more of its motion; ",
+                         much_stiffer(character))
+           : ""));
 }
 
 /// The verdict on the frames of the report, which is thrown where it is strict and bad.

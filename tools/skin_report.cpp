@@ -60,20 +60,12 @@ std::string fault_text(const fem::SkinFrame& frame, SkinFault fault) {
                      100.0 * frame.away_most);
 }
 
-/// The stiffest flesh there is [Pa]: what --young sets counts everywhere.
-double stiffest(const Character& c) {
-  double young = c.body_options.material.young;
-  for (const fem::JointMaterial& of_joint : c.body_options.materials)
-    young = std::max(young, of_joint.material.young);
-  return young;
-}
-
 std::string remedy(const Scene& scene, const Character& c, const fem::Body& body, int vertex,
                    SkinFault fault) {
   if (scene.guard == Switch::Off && fault != SkinFault::FarAway)
     return "--guard on, which lays torn skin back towards plain skinning";
   const double across = cells_across(c, body, vertex);
-  const std::string stiffer = fmt::format("--young {:.2g}", 4.0 * stiffest(c));
+  const std::string stiffer = fmt::format("--young {:.2g}", much_stiffer(c));
   constexpr double kEnough = 0.5;
   constexpr double kMostCells = 8000.0;
   if (across >= kEnough || !scene.lattice.empty() || scene.cell_size) return stiffer + ", stiffer flesh";
@@ -94,7 +86,32 @@ SkinFinding describe(const Scene& scene, const Character& c, const fem::Body& bo
   return finding;
 }
 
+/// How far volume is off [-], by rest or by plain skinning, whichever is nearer: limbs that cross each other
+/// count twice in both.
+double volume_error(const fem::SkinFrame& frame) {
+  return std::min(std::abs(frame.volume_of_rest - 1.0), std::abs(frame.volume_ratio - 1.0));
+}
+
+std::string volume_text(const Scene& scene, const Character& c, const std::vector<fem::SkinFrame>& frames,
+                        const std::vector<int>& numbers) {
+  constexpr double kAllowed = 0.05;
+  const auto worst = std::ranges::max_element(frames, {}, volume_error);
+  if (worst == frames.end() || volume_error(*worst) <= kAllowed) return {};
+  std::string line =
+      fmt::format("{}: frame {}: the skin holds {:.2f} times its volume at rest", c.rig.file,
+                  numbers[static_cast<std::size_t>(worst - frames.begin())], worst->volume_of_rest);
+  if (scene.model != "neo-hookean") line += "; hint: --model neo-hookean, which keeps it best";
+  return line;
+}
+
 }  // namespace
+
+double much_stiffer(const Character& c) {
+  double young = c.body_options.material.young;
+  for (const fem::JointMaterial& of_joint : c.body_options.materials)
+    young = std::max(young, of_joint.material.young);
+  return 4.0 * young;
+}
 
 std::optional<fem::SkinJudge> make_skin_judge(const Character& c, const std::vector<double>& times) {
   if (!(c.rig.height > 0.0) || c.clip < 0) return std::nullopt;
@@ -137,6 +154,7 @@ SkinFinding find_fault(const Scene& scene, const Character& c, const fem::Body& 
       describe(scene, c, body, frames[worst], summary.judgement, fmt::format("frame {}", numbers[worst]));
   finding.frame = numbers[worst];
   finding.torn_frames = summary.torn_frames;
+  finding.volume_line = volume_text(scene, c, frames, numbers);
   return finding;
 }
 
@@ -149,8 +167,9 @@ SkinFinding find_fault(const Scene& scene, const Character& c, const fem::Body& 
 }
 
 void tell(const SkinFinding& finding, const Talk& talk) {
-  if (finding.line.empty()) return;
-  talk((finding.verdict == SkinVerdict::Torn ? "warning: " : "note: ") + finding.line);
+  if (!finding.line.empty())
+    talk((finding.verdict == SkinVerdict::Torn ? "warning: " : "note: ") + finding.line);
+  if (!finding.volume_line.empty()) talk("note: " + finding.volume_line);
 }
 
 void refuse_torn(const SkinFinding& finding) {

@@ -37,7 +37,12 @@ struct SkinFinding {
   std::string place;  ///< by bone and part.
   /// One line for the user: where, what and the remedy; empty where the skin is fine.
   std::string line;
+  /// One more where the skin gains or loses volume that plain skinning does not: a twentieth of that at rest.
+  std::string volume_line;
 };
+
+/// Of the flesh of all joints: four times the stiffest there is [Pa], as --young counts everywhere.
+double much_stiffer(const Character& character);
 
 /// `frames` in order and their numbers, as many.
 SkinFinding find_fault(const Scene& scene, const Character& character, const fem::Body& body,

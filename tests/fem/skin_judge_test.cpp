@@ -259,6 +259,7 @@ TEST(SkinJudge, MeasuresVolumeAgainstPlainSkinning) {
   const Skin tube = make_tube();
   const Eigen::Affine3d larger(Eigen::Scaling(1.1, 1.2, 1.3));
   EXPECT_NEAR(tube.measure(moved(tube.rest, larger)).volume_ratio, 1.1 * 1.2 * 1.3, 1e-12);
+  EXPECT_NEAR(tube.measure(moved(tube.rest, larger)).volume_of_rest, 1.1 * 1.2 * 1.3, 1e-12);
 }
 
 // Copies of vertices along texture seams, the second side of a sheet, parts without flesh: nothing of them

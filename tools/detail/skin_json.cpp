@@ -13,6 +13,7 @@ nlohmann::ordered_json skin_json(const fem::SkinFrame& frame, const assets::Rig&
                               {"creases_heights", frame.creases},
                               {"roughness_edges", frame.roughness},
                               {"volume_ratio", frame.volume_ratio},
+                              {"volume_of_rest", frame.volume_of_rest},
                               {"away_p95_heights", frame.away_95},
                               {"away_p99_heights", frame.away_99},
                               {"away_largest_heights", frame.away_most}};
