@@ -24,8 +24,8 @@ struct SkinFrame {
   /// Distance from plain skinning that 5 % and 1 % of the area exceed, and the largest [heights].
   double away_95 = 0.0, away_99 = 0.0, away_most = 0.0;
   double volume_of_rest = 1.0;  ///< volume within the skin over that at rest.
-  int worst_vertex = -1;     ///< of the input, where the fault is largest.
-  int farthest_vertex = -1;  ///< of the input, where away_most is.
+  int worst_vertex = -1;        ///< of the input, where the fault is largest.
+  int farthest_vertex = -1;     ///< of the input, where away_most is.
 };
 
 enum class SkinVerdict { Fine, Rough, Torn };

@@ -167,9 +167,10 @@ SkinFinding find_fault(const Scene& scene, const Character& c, const fem::Body& 
 }
 
 void tell(const SkinFinding& finding, const Talk& talk) {
+  if (!finding.volume_line.empty()) talk("note: " + finding.volume_line);
+  // Last, where it is seen.
   if (!finding.line.empty())
     talk((finding.verdict == SkinVerdict::Torn ? "warning: " : "note: ") + finding.line);
-  if (!finding.volume_line.empty()) talk("note: " + finding.volume_line);
 }
 
 void refuse_torn(const SkinFinding& finding) {

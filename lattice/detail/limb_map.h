@@ -104,9 +104,9 @@ class LimbMap {
   const ReducedSkeleton& skeleton_;
   const ControlLattice& lattice_;
   SkeletonDistance distance_;
-  double h_;                         ///< unit coordinates.
-  std::vector<int> frame_of_joint_;  ///< with the soft frames of the skeleton.
-  std::vector<int> frame_of_bone_;   ///< bone edges that no skin hangs on have frames of their own.
+  double h_;                                ///< unit coordinates.
+  std::vector<int> frame_of_joint_;         ///< with the soft frames of the skeleton.
+  std::vector<int> frame_of_bone_;          ///< bone edges that no skin hangs on have frames of their own.
   std::vector<std::vector<int>> bones_of_;  ///< per joint: those its weight counts for.
   std::vector<std::array<int, 3>> frames_;  ///< of the corners of the welded skin's triangles.
   std::vector<bool> is_sheet_;              ///< per welded vertex: no flesh is behind it.
