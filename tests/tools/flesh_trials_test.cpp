@@ -222,7 +222,7 @@ TEST_F(FleshTrials, BlendedStandsOnThinLimbs) {
       const fs::path folder = out(plain ? "plain" : "blended");
       fs::remove_all(folder);
       const Outcome outcome =
-          run(command_line("simulate " + quoted(rig) + " " + one.flags + " --frames 0-12 --preview off -o " +
+          run(command_line("simulate " + quoted(rig) + " " + one.flags + " --frames 0-8 --preview off -o " +
                            quoted(folder) + (plain ? " --model skin --offset 0" : " --model blended")));
       ASSERT_EQ(outcome.exit_code, 0) << outcome.text;
       const assets::Pc2Reader cache((folder / "skin.pc2").string());
