@@ -118,9 +118,9 @@ std::string options_of(const std::string& line) {
   std::string options, word;
   while (words >> word) {
     if (word.rfind("--", 0) != 0) continue;
-    options += " " + word;
+    options.append(1, ' ').append(word);
     words >> word;
-    options += " " + word.substr(0, word.find(','));
+    options.append(1, ' ').append(word, 0, word.find(','));
   }
   return options;
 }
