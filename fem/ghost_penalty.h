@@ -19,8 +19,8 @@ namespace sinew::fem {
 /// they go on as their neighbours do. S is a scalar matrix times the identity, constant, and zero for every
 /// affine map, hence for every rigid motion.
 struct GhostPenalty {
-  /// gamma [-]; >= 0, 0 = none. From 0.1 on limbs one cell thick lock; 0.01 costs a bar two cells across half
-  /// a percent in bending.
+  /// gamma [-]; >= 0, 0 = none. From 0.1 on limbs one cell thick lock; 0.01 costs a bar two cells across a
+  /// fifth of a percent in bending.
   double strength = 0.01;
   /// Faces count where one of their cells is filled less than this [-]. Cut cells that hold more are held by
   /// their own flesh.

@@ -26,7 +26,7 @@ class SteadyGuard {
   Mended mend_next(const lattice::Points& plain, lattice::Points& skin);
 
  private:
-  static constexpr int kLooks = 2;  ///< a third one changes no verdict on the rigs that were tried.
+  static constexpr int kLooks = 2;
   struct Frame {
     lattice::Points plain, flesh;
     GuardWeights by;  ///< what the looks so far have found.

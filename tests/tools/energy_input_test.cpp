@@ -59,7 +59,7 @@ TEST_P(EnergyInput, IsAllThatTheFleshHas) {
   const Character character = make_character(scene, [](const std::string&) {});
   const fem::Body body = make_body(character);
   fem::SimulationOptions options = simulation_options(scene, character, body);
-  options.step = 1.0 / 480.0;  // the middle of a step stands for it: at 1/120 s up to 4 % is missed
+  options.step = 1.0 / 480.0;  // short, as the middle of a step stands for it
   const double begin = character.the_clip().start;
   fem::Simulation simulation(
       body, [&](double time) { return character.pose(time); }, begin, options);
