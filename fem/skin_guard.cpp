@@ -250,6 +250,7 @@ GuardWeights SkinGuard::weigh(const Points& plain, const Points& flesh, const Gu
   GuardWeights result = from;
   Points x = flesh;
   if (!from.weights.empty()) lay(result, plain, flesh, x);
+  // What is wrong after weights that were enough in their own frames is not cured by more of the same.
   for (int pass = from.weights.empty() ? 0 : kSmoothPasses; pass < kPasses; ++pass) {
     std::vector<double> found = faults(x, side);
     if (pass > 0)

@@ -50,14 +50,16 @@ void SteadyGuard::see(const Points& plain, const Points& flesh) {
       look(k, pass_on(k - 1));
 }
 
-Mended SteadyGuard::mend_next(const Points& plain, Points& skin) {
+Mended SteadyGuard::mend_next(Points& skin) {
   // At the end, when none will follow, frames are still on their way.
   const auto last = looks_.size() - 1;
   if (static_cast<int>(looks_[last].frames.size()) <= looks_[last].weights.lookahead()) {
     for (std::size_t k = 1; k < looks_.size(); ++k)
       while (!looks_[k - 1].frames.empty()) look(k, pass_on(k - 1));
   }
-  return guard_->mend(pass_on(last).by, plain, skin);
+  Frame frame = pass_on(last);
+  skin = std::move(frame.flesh);
+  return guard_->mend(frame.by, frame.plain, skin);
 }
 
 }  // namespace sinew::fem

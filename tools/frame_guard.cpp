@@ -30,15 +30,8 @@ Points welded(const assets::PhysicsSkin& skin, const Points& of_rig) {
   return result;
 }
 
-/// Mend: (plain skinning, flesh to be changed), both of the welded skin.
-template <class Mend>
-fem::Mended mend_welded(const assets::PhysicsSkin& skin, const Points& skinned, Points& simulated,
-                        const Mend& mend) {
-  Points flesh = welded(skin, simulated);
-  const fem::Mended mended = mend(welded(skin, skinned), flesh);
-  if (mended.vertex >= 0)
-    each_flesh_vertex(skin, [&](Eigen::Index row, int vertex) { simulated.row(row) = flesh.row(vertex); });
-  return mended;
+void put_back(const assets::PhysicsSkin& skin, const Points& flesh, Points& of_rig) {
+  each_flesh_vertex(skin, [&](Eigen::Index row, int vertex) { of_rig.row(row) = flesh.row(vertex); });
 }
 
 }  // namespace
@@ -55,16 +48,20 @@ void FrameGuard::see(const Points& skinned, const Points& simulated) {
   if (steady_) steady_->see(welded(*skin_, skinned), welded(*skin_, simulated));
 }
 
-fem::Mended FrameGuard::mend_next(const Points& skinned, Points& simulated) {
+fem::Mended FrameGuard::mend_next(Points& simulated) {
   if (!steady_) return {};
-  return mend_welded(*skin_, skinned, simulated,
-                     [&](const Points& plain, Points& flesh) { return steady_->mend_next(plain, flesh); });
+  Points flesh;
+  const fem::Mended mended = steady_->mend_next(flesh);
+  if (mended.vertex >= 0) put_back(*skin_, flesh, simulated);
+  return mended;
 }
 
 fem::Mended FrameGuard::mend(const Points& skinned, Points& simulated) const {
   if (!guard_) return {};
-  return mend_welded(*skin_, skinned, simulated,
-                     [&](const Points& plain, Points& flesh) { return guard_->mend(plain, flesh); });
+  Points flesh = welded(*skin_, simulated);
+  const fem::Mended mended = guard_->mend(welded(*skin_, skinned), flesh);
+  if (mended.vertex >= 0) put_back(*skin_, flesh, simulated);
+  return mended;
 }
 
 }  // namespace sinew::tools

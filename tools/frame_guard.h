@@ -20,9 +20,9 @@ class FrameGuard {
   int lookahead() const { return steady_ ? steady_->lookahead() : 0; }
   /// The next frame as the flesh has it. Both by rig vertex, num_vertices x 3 [m].
   void see(const lattice::Points& skinned, const lattice::Points& simulated);
-  /// The first frame that was seen and not mended; changes flesh in `simulated` alone. Vertices of the result
-  /// are those of the welded skin.
-  fem::Mended mend_next(const lattice::Points& skinned, lattice::Points& simulated);
+  /// The first frame that was seen and not mended; changes flesh in `simulated`, of that frame, alone.
+  /// Vertices of the result are those of the welded skin.
+  fem::Mended mend_next(lattice::Points& simulated);
 
   /// An instant that stands alone.
   fem::Mended mend(const lattice::Points& skinned, lattice::Points& simulated) const;

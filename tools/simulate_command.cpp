@@ -289,7 +289,7 @@ std::vector<assets::PreviewFrame> run_frames(const Scene& scene, const Character
   int written = 0;
   const auto write_first = [&] {
     auto& [frame, pose, f] = pending.front();
-    f.mended = guard.mend_next(frame.skinned, frame.simulated);
+    f.mended = guard.mend_next(frame.simulated);
     props.place(pose, frame.skinned, frame.simulated);
     if (written == 0) talk(distance_line(character.rig, frame, f.frame));
     try {

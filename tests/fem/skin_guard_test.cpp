@@ -98,6 +98,42 @@ TEST(SkinGuard, LaysSkinOnPlainSkinningThatCollapses) {
   EXPECT_GT((skin - plain).cwiseAbs().maxCoeff(), 0.3);  // far from the band the ripple stays
 }
 
+// A fold of 50 degrees along a grid line: a crease in a fine skin, and all that a coarse one has to bend by.
+TEST(SkinGuard, LetsCoarseSkinBendByItsEdges) {
+  for (const int n : {3, 24}) {
+    const Sheet sheet(n);
+    const SkinGuard guard(sheet.points, sheet.triangles);
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(50.0 * M_PI / 180.0, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const Eigen::RowVector3d hinge(n / 3, 0, 0);
+    Points skin = sheet.points;
+    for (Eigen::Index v = 0; v < skin.rows(); ++v)
+      if (skin(v, 0) > hinge[0]) skin.row(v) = (skin.row(v) - hinge) * turn.transpose() + hinge;
+    const Points bent = skin;
+    EXPECT_EQ(guard.mend(sheet.points, skin).vertex >= 0, n == 24);
+    EXPECT_EQ(skin == bent, n == 3);
+  }
+}
+
+// Three rings of a coarse skin are half of it: what fades goes no farther than a tenth of its size. Here an
+// edge is longer than that, so only the corners of what is wrong move.
+TEST(SkinGuard, LeavesCoarseSkinBesideAFaultAsItIs) {
+  const Sheet sheet(6);
+  const SkinGuard guard(sheet.points, sheet.triangles);
+  const int middle = 3 * 7 + 3;
+  Points skin = sheet.points;
+  skin.row(middle) += Eigen::RowVector3d(0, 0, 4);
+  const Points torn = skin;
+  guard.mend(sheet.points, skin);
+  EXPECT_LE(skin(middle, 2), 0.5);
+  for (Eigen::Index v = 0; v < skin.rows(); ++v) {
+    const double away = (sheet.points.row(v) - sheet.points.row(middle)).cwiseAbs().maxCoeff();
+    if (away > 1.5) {
+      EXPECT_TRUE(skin.row(v) == torn.row(v)) << v;
+    }
+  }
+}
+
 TEST(SkinGuard, DoesNotPop) {
   const Sheet sheet(12);
   const SkinGuard guard(sheet.points, sheet.triangles);

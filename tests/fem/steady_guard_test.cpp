@@ -90,12 +90,13 @@ struct Clip {
   }
 };
 
-std::vector<Points> mended(const SkinGuard& guard, const Clip& clip, int reach) {
-  SteadyGuard steady(guard, reach);
+std::vector<Points> mended(const SkinGuard& guard, const Clip& clip, int reach,
+                           int looks = SteadyGuard::kLooks) {
+  SteadyGuard steady(guard, reach, looks);
   std::vector<Points> result;
   const auto mend_next = [&] {
-    Points skin = clip.flesh[result.size()];
-    steady.mend_next(clip.plain, skin);
+    Points skin;
+    steady.mend_next(skin);
     result.push_back(skin);
   };
   for (std::size_t k = 0; k < clip.flesh.size(); ++k) {
@@ -138,6 +139,40 @@ TEST(SteadyGuard, MendsEveryFrameAndPopsInNone) {
   // Measured: the torn flesh 1.46, steady 0.26, each frame by itself 6.2.
   EXPECT_LE(jerk(steady), 0.5 * jerk(clip.flesh));
   EXPECT_GE(jerk(alone), 2.0 * jerk(clip.flesh));
+}
+
+// One frame has a ripple where plain skinning collapses, which nothing but plain skinning itself cures.
+// Before and after it flesh lags far behind as a whole, which is no fault; drawn to plain skinning in one
+// place, as the weights of that frame fade, it would be.
+TEST(SteadyGuard, LooksAgainAtTheRimsOfWeightsOnTheirWay) {
+  const Sheet sheet(24);
+  Points plain = sheet.points;
+  for (Eigen::Index v = 0; v < plain.rows(); ++v)
+    plain(v, 0) -= 0.95 * std::clamp(sheet.points(v, 0) - 10.0, 0.0, 4.0);
+  const SkinGuard guard(sheet.points, sheet.triangles);
+  const auto longest = [&](int looks) {
+    SteadyGuard steady(guard, 2, looks);
+    for (int k = 0; k < 11; ++k) {
+      Points flesh = plain;
+      for (Eigen::Index v = 0; v < flesh.rows(); ++v) {
+        if (k == 5)
+          flesh(v, 0) -= 0.4 * std::sin(0.5 * sheet.points(v, 0)) * std::cos(0.3 * sheet.points(v, 1));
+        if (k != 5) flesh(v, 1) += 40.0;
+      }
+      steady.see(plain, flesh);
+    }
+    double edge = 0.0;
+    for (int k = 0; k < 11; ++k) {
+      Points skin;
+      steady.mend_next(skin);
+      edge = std::max(edge, longest_edge(sheet, skin));
+    }
+    return edge;
+  };
+  // Measured 9.3, 3.9 and 1.5; from 2.5 on an eye calls skin torn.
+  EXPECT_GT(longest(1), longest(2));
+  EXPECT_GT(longest(2), 2.5);
+  EXPECT_LE(longest(SteadyGuard::kLooks), 2.5);
 }
 
 }  // namespace
