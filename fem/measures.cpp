@@ -13,9 +13,13 @@ namespace {
 
 /// Octants filled less hold hardly any flesh to strain or to turn inside out.
 constexpr double kFleshy = 0.5;
-/// Of its volume; where growth leaves less, no shape is free of strain: between a joint that a clip scales
-/// and one that it does not, it is turned inside out.
-constexpr double kLeastGrowth = 0.05;
+/// Smallest det of growth over that of the mean stretch cubed: between a joint that a clip scales and one
+/// that it does not the grown shape may be flat or inside out, and no strain can be told from it.
+constexpr double kLeastShape = 0.05;
+
+bool has_shape(const Eigen::Matrix3d& growth) {
+  return growth.determinant() >= kLeastShape * std::pow(growth.squaredNorm() / 3.0, 1.5);
+}
 
 struct CellMeasure {
   double strain = 0.0;
@@ -84,7 +88,7 @@ CellMeasure measure_cell(const Body& body, std::size_t c, const lattice::Points&
     Eigen::Matrix3d gradient = at.from_rest;  // F, from what is free of strain
     if (grown != nullptr) gradient *= at.growth.inverse();
     const double fill = body.fill[c][static_cast<std::size_t>(at.index)];
-    if (fill >= kFleshy && at.growth.determinant() >= kLeastGrowth) {
+    if (fill >= kFleshy && has_shape(at.growth)) {
       out.det = std::min(out.det, gradient.determinant());
       out.strain = std::max(out.strain, stretch_strain(gradient));
     }
