@@ -42,7 +42,8 @@ Json finding_json(const SkinFinding& finding) {
           {"worst_frame", finding.frame},
           {"worst_place", finding.place},
           {"torn_frames", finding.torn_frames},
-          {"line", finding.line}};
+          {"line", finding.line},
+          {"volume_line", finding.volume_line}};
 }
 
 Json lattice_json(const lattice::ControlLattice& lattice) {

@@ -92,16 +92,12 @@ double volume_error(const fem::SkinFrame& frame) {
   return std::min(std::abs(frame.volume_of_rest - 1.0), std::abs(frame.volume_ratio - 1.0));
 }
 
-std::string volume_text(const Scene& scene, const Character& c, const std::vector<fem::SkinFrame>& frames,
-                        const std::vector<int>& numbers) {
+/// No remedy is named: neo-Hookean flesh helps a snake and not a spider.
+std::string volume_text(const Character& c, const fem::SkinFrame& frame, const std::string& when) {
   constexpr double kAllowed = 0.05;
-  const auto worst = std::ranges::max_element(frames, {}, volume_error);
-  if (worst == frames.end() || volume_error(*worst) <= kAllowed) return {};
-  std::string line =
-      fmt::format("{}: frame {}: the skin holds {:.2f} times its volume at rest", c.rig.file,
-                  numbers[static_cast<std::size_t>(worst - frames.begin())], worst->volume_of_rest);
-  if (scene.model != "neo-hookean") line += "; hint: --model neo-hookean, which keeps it best";
-  return line;
+  if (volume_error(frame) <= kAllowed) return {};
+  return fmt::format("{}: {}: the skin holds {:.2f} times its volume at rest", c.rig.file, when,
+                     frame.volume_of_rest);
 }
 
 }  // namespace
@@ -154,14 +150,17 @@ SkinFinding find_fault(const Scene& scene, const Character& c, const fem::Body& 
       describe(scene, c, body, frames[worst], summary.judgement, fmt::format("frame {}", numbers[worst]));
   finding.frame = numbers[worst];
   finding.torn_frames = summary.torn_frames;
-  finding.volume_line = volume_text(scene, c, frames, numbers);
+  const auto swollen = std::ranges::max_element(frames, {}, volume_error);
+  finding.volume_line = volume_text(
+      c, *swollen, fmt::format("frame {}", numbers[static_cast<std::size_t>(swollen - frames.begin())]));
   return finding;
 }
 
 SkinFinding find_fault(const Scene& scene, const Character& c, const fem::Body& body,
                        const fem::SkinFrame& pose, double time) {
-  SkinFinding finding = describe(scene, c, body, pose, fem::judge(pose, fem::FrameKind::First),
-                                 fmt::format("pose at {:.4g} s", time));
+  const std::string when = fmt::format("pose at {:.4g} s", time);
+  SkinFinding finding = describe(scene, c, body, pose, fem::judge(pose, fem::FrameKind::First), when);
+  finding.volume_line = volume_text(c, pose, when);
   finding.torn_frames = finding.verdict == SkinVerdict::Torn ? 1 : 0;
   return finding;
 }

@@ -37,11 +37,11 @@ struct SkinFinding {
   std::string place;  ///< by bone and part.
   /// One line for the user: where, what and the remedy; empty where the skin is fine.
   std::string line;
-  /// One more where the skin gains or loses volume that plain skinning does not: a twentieth of that at rest.
+  /// One more where the skin's volume is a twentieth off both that at rest and that of plain skinning.
   std::string volume_line;
 };
 
-/// Of the flesh of all joints: four times the stiffest there is [Pa], as --young counts everywhere.
+/// Four times the stiffest flesh that there is [Pa], as --young counts everywhere.
 double much_stiffer(const Character& character);
 
 /// `frames` in order and their numbers, as many.

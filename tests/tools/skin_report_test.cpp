@@ -1,6 +1,9 @@
 // What a run says of its skin: the measures against another program's, the warning, --strict.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "assets/rig.h"
 #include "fem/skin_judge.h"
@@ -181,6 +184,21 @@ TEST_F(Simulate, WarnsOfTornSkinAndRefusesItWhenStrict) {
   EXPECT_NE(line.find("arm.glb: frame "), std::string::npos) << line;
   EXPECT_NE(line.find("the skin is torn at '"), std::string::npos) << line;
   EXPECT_NE(line.find("; hint: --"), std::string::npos) << line;
+  // It has stretched along its bones, too, which plain skinning does not: a note before the warning.
+  double farthest = 0.0, held = 1.0;
+  for (const auto& frame : report["frames"]) {
+    const double of_rest = frame["skin"]["volume_of_rest"], of_plain = frame["skin"]["volume_ratio"];
+    const double off = std::min(std::abs(of_rest - 1.0), std::abs(of_plain - 1.0));
+    if (off > farthest) farthest = off, held = of_rest;
+  }
+  EXPECT_GT(farthest, 0.05);
+  const auto volume = report["skin"]["volume_line"].get<std::string>();
+  std::array<char, 8> number{};
+  std::snprintf(number.data(), number.size(), "%.2f", held);
+  EXPECT_NE(volume.find("the skin holds " + std::string(number.data()) + " times its volume at rest"),
+            std::string::npos)
+      << volume;
+  EXPECT_NE(warned.text.find("note: " + volume + "\n"), std::string::npos) << warned.text;
 
   fs::remove_all(out("run"));
   const Outcome refused = run(command_line(command + " --strict"));
