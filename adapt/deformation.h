@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "fem/body.h"
+#include "fem/body/body.h"
 
 /// Where the flesh deforms: what adaptive refinement will look at ([Capell02, sec. 4.3]).
 namespace sinew::adapt {

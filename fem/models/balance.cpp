@@ -11,7 +11,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "fem/placement.h"
+#include "fem/body/placement.h"
 
 namespace sinew::fem {
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "fem/growth.h"
+#include "fem/body/growth.h"
 #include "fem/models/cell_energy.h"
 #include "fem/models/model.h"
 
@@ -29,7 +29,7 @@ struct Balance {
   lattice::Points guess;              ///< first guess of the move, in the space of the unknowns [m].
 };
 
-/// Whether flesh grows with joints that a clip scales (fem/growth.h) or keeps its own size.
+/// Whether flesh grows with joints that a clip scales (fem/body/growth.h) or keeps its own size.
 enum class Grows { No, WithItsJoints };
 
 /// Of a stage. The guess moves the flesh with its frames and lets it keep its velocity relative to them.

@@ -2,11 +2,11 @@
 
 #include <span>
 
-#include "fem/body.h"
-#include "fem/stage_problem.h"
+#include "fem/body/body.h"
+#include "fem/models/stage_problem.h"
 
 /// What a nonlinear model is: the energy of one leaf cell and its derivatives. The solver
-/// (fem/models/newton_model.h) knows no materials, and an energy knows no system.
+/// (fem/models/detail/newton_model.h) knows no materials, and an energy knows no system.
 namespace sinew::fem {
 
 /// Corners of a leaf cell as columns, relative to its first corner, so that far positions stay accurate.

@@ -6,12 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "fem/body.h"
-#include "fem/stage_problem.h"
+#include "fem/body/body.h"
+#include "fem/models/stage_problem.h"
 
 /// The ladder: models of the flesh from skinning to full nonlinear elasticity behind one interface. All of
-/// them move the same State along the same poses; the time loop (fem/simulation.h) does not know which one it
-/// steps. Adding a model takes a file pair in this folder and one line in registry.cpp.
+/// them move the same State along the same poses; the time loop (fem/time/simulation.h) does not know which
+/// one it steps. Adding a model takes a file pair in this folder and one line in registry.cpp.
 namespace sinew::fem {
 
 /// Why a solve ended. Everything but Ok leaves the caller's state as it was.
@@ -66,7 +66,7 @@ class Model {
   /// What the model's law says of leaf positions x in a pose, without viscosity.
   virtual CellForces cell_forces(const lattice::Points& x, const PosedFrames& pose) = 0;
 
-  /// The law is linear in the rotations of the cells' frames, as fem/measures.h has it.
+  /// The law is linear in the rotations of the cells' frames, as fem/report/measures.h has it.
   virtual bool linear_in_frames() const { return false; }
 
   /// Its steps may give the flesh energy that nothing put in.

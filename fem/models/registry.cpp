@@ -1,14 +1,14 @@
 #include <algorithm>
 #include <array>
 
-#include "fem/models/blended.h"
-#include "fem/models/blended_stiffness.h"
-#include "fem/models/corotational.h"
+#include "fem/models/detail/blended.h"
+#include "fem/models/detail/blended_stiffness.h"
+#include "fem/models/detail/corotational.h"
+#include "fem/models/detail/neo_hookean.h"
+#include "fem/models/detail/skin.h"
+#include "fem/models/detail/springs.h"
+#include "fem/models/detail/stvk.h"
 #include "fem/models/model.h"
-#include "fem/models/neo_hookean.h"
-#include "fem/models/skin.h"
-#include "fem/models/springs.h"
-#include "fem/models/stvk.h"
 
 namespace sinew::fem {
 namespace {

@@ -13,7 +13,7 @@
 #include <Eigen/Geometry>
 #include <tbb/global_control.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/bar.h"
 
 namespace sinew {

@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "tests/bench/swinging_bar.h"
 
 namespace sinew {

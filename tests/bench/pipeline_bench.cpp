@@ -10,8 +10,8 @@
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
-#include "fem/blended_solver.h"
-#include "tools/character.h"
+#include "fem/models/detail/blended_solver.h"
+#include "tools/session/character.h"
 
 namespace sinew {
 namespace {

@@ -19,7 +19,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "tests/bench/swinging_bar.h"
 #include "tests/fem/arm.h"
 

@@ -23,8 +23,15 @@ MAY_INCLUDE = {
     "tests": set(FOLDERS),
 }
 
+# Rooms of a folder, from the bottom up: a room includes its own files and those of rooms below it. A room that is not
+# named here, or a file that lies in none, is an offence, too.
+ROOMS = {
+    "fem": ["material", "linear", "body", "skin", "forces", "models", "report", "time"],
+    "tools": ["support", "scene", "session", "ladder", "commands", "shell", "measured", "make_samples", "cmake"],
+}
+
 # Programs that are one half of a folder's internals.
-FRIENDS = {"tools/import_main.cpp": "assets"}
+FRIENDS = {"tools/shell/import_main.cpp": "assets"}
 
 # Headers of other libraries (a prefix) and the folders that may see them; tests may see all.
 LIBRARIES = {
@@ -113,6 +120,35 @@ def check_own_include(root, name, line, included):
         yield f"{name}:{line}: \"{included}\": {folder} may include {allowed}"
     elif "/detail/" in included and target != folder and folder != "tests" and FRIENDS.get(name) != target:
         yield f"{name}:{line}: \"{included}\": internals of {target}"
+
+
+def room_of(name):
+    """The room of a file in a folder with rooms, None elsewhere; "" for a file that lies in no room."""
+    parts = name.split("/")
+    if parts[0] not in ROOMS:
+        return None
+    return parts[1] if len(parts) > 2 else ""
+
+
+def check_room_include(name, line, included):
+    folder, room, target = name.split("/")[0], room_of(name), room_of(included)
+    if room is None or included.split("/")[0] != folder or {room, target} - set(ROOMS[folder]):
+        return
+    if ROOMS[folder].index(target) > ROOMS[folder].index(room):
+        yield f"{name}:{line}: \"{included}\": room {room} lies below {target}"
+    elif "/detail/" in included and target != room:
+        yield f"{name}:{line}: \"{included}\": internals of {folder}/{target}"
+
+
+def check_rooms(root):
+    for name in sources(root):
+        room = room_of(name)
+        if room is not None and room not in ROOMS[name.split("/")[0]]:
+            yield f"{name}: lies in none of the rooms {', '.join(ROOMS[name.split('/')[0]])}"
+        for line, content in enumerate(read(root, name).splitlines(), 1):
+            match = INCLUDE.match(content)
+            if match and match.group(1) == '"':
+                yield from check_room_include(name, line, match.group(2))
 
 
 def check_library_include(root, name, line, included):
@@ -207,8 +243,8 @@ def check_format(root):
         yield f"{name}: not formatted; run {tool} -i {name}"
 
 
-RULES = {"layout": check_layout, "includes": check_includes, "words": check_words, "sizes": check_sizes,
-         "references": check_references, "format": check_format}
+RULES = {"layout": check_layout, "includes": check_includes, "rooms": check_rooms, "words": check_words,
+         "sizes": check_sizes, "references": check_references, "format": check_format}
 
 
 def main():

@@ -9,15 +9,15 @@ import unittest
 import check_tree
 
 GOOD = {
-    "README.md": "# A tree\n\n![picture](assets/a.png) tools/main.cpp\n\n- [Gauss09] Theoria motus.\n",
+    "README.md": "# A tree\n\n![picture](assets/a.png) tools/shell/main.cpp\n\n- [Gauss09] Theoria motus.\n",
     "assets/a.png": "picture",
     "lattice/cell.h": "#pragma once\n\n#include <vector>\n\n#include <Eigen/Core>\n",
     "lattice/detail/mesh.h": "#pragma once\n\n#include <CGAL/Mesh_3.h>\n",
     "lattice/cell.cpp": '#include "lattice/cell.h"\n\n#include <CGAL/Mesh_3.h>\n\n#include "lattice/detail/mesh.h"\n',
-    "fem/body.h": '#pragma once\n\n#include "lattice/cell.h"\n',
-    "fem/body.cpp": '#include "fem/body.h"\n\n#include <cholmod.h>\n\n#include "fem/body.h"\n',
-    "tools/main.cpp": '#include <sys/wait.h>\n#include <unistd.h>\n\n#include "fem/body.h"\n',
-    "tests/fem/body_test.cpp": '#include <gtest/gtest.h>\n\n#include "fem/body.h"\n',
+    "fem/body/body.h": '#pragma once\n\n#include "lattice/cell.h"\n',
+    "fem/body/body.cpp": '#include "fem/body/body.h"\n\n#include <cholmod.h>\n\n#include "fem/body/body.h"\n',
+    "tools/shell/main.cpp": '#include <sys/wait.h>\n#include <unistd.h>\n\n#include "fem/body/body.h"\n',
+    "tests/fem/body_test.cpp": '#include <gtest/gtest.h>\n\n#include "fem/body/body.h"\n',
 }
 
 
@@ -54,11 +54,19 @@ class CheckTree(unittest.TestCase):
         self.expect("layout", "docs/manual.md:")
 
     def test_wrong_directions_are_found(self):
-        self.write("assets/rig.cpp", '#include "fem/body.h"\n')
-        self.write("lattice/down.cpp", '#include "fem/body.h"\n')
+        self.write("assets/rig.cpp", '#include "fem/body/body.h"\n')
+        self.write("lattice/down.cpp", '#include "fem/body/body.h"\n')
         self.write("fem/peek.cpp", '#include "lattice/detail/mesh.h"\n')
-        self.expect("includes", 'assets/rig.cpp:1: "fem/body.h"', 'fem/peek.cpp:1: "lattice/detail/mesh.h"',
-                    'lattice/down.cpp:1: "fem/body.h": lattice may include nobody else')
+        self.expect("includes", 'assets/rig.cpp:1: "fem/body/body.h"', 'fem/peek.cpp:1: "lattice/detail/mesh.h"',
+                    'lattice/down.cpp:1: "fem/body/body.h": lattice may include nobody else')
+
+    def test_upward_includes_between_rooms_are_found(self):
+        self.write("fem/linear/factor.cpp", '#include "fem/body/body.h"\n')
+        self.write("fem/time/run.cpp", '#include "fem/body/body.h"\n#include "fem/body/detail/part.h"\n')
+        self.write("fem/attic/old.cpp", "")
+        self.write("fem/loose.cpp", "")
+        self.expect("rooms", "fem/attic/old.cpp: lies in none", "fem/linear/factor.cpp:1:", "fem/loose.cpp: lies in none",
+                    'fem/time/run.cpp:2: "fem/body/detail/part.h": internals of fem/body')
 
     def test_includes_that_do_not_start_at_the_root_are_found(self):
         self.write("fem/near.cpp", '#include "body.h"\n')

@@ -1,6 +1,6 @@
 // Bones that turn, jump, race, shake and are pulled apart.
 
-#include "fem/envelope.h"
+#include "fem/time/envelope.h"
 #include "tests/extremes/extremes.h"
 
 namespace sinew::tests {

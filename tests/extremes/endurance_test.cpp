@@ -164,9 +164,9 @@ TEST(Extremes, AHeldElbowGainsNoEnergy) {
                       table.at_most("kinetic energy left", run.late / run.early, 1e-3);
                     });
   }
-  // Where blending would win over the damping: without the cap on its energy (fem/energy_cap.h) it gains 0.13
-  // of it at the least damping of the envelope, and without damping at 120 degrees 1.5 times as much as there
-  // is.
+  // Where blending would win over the damping: without the cap on its energy (fem/time/energy_cap.h) it gains
+  // 0.13 of it at the least damping of the envelope, and without damping at 120 degrees 1.5 times as much as
+  // there is.
   for (double ratio : {0.05, 0.0}) {
     for (double degrees : kNightly ? all : std::vector<double>{30.0, 120.0}) {
       for_held_elbows({degrees, 1.0 / 240.0, {ratio, 3.0}}, {"blended"}, 600,

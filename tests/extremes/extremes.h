@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "fem/equilibrium.h"
 #include "fem/models/model.h"
-#include "fem/simulation.h"
+#include "fem/time/equilibrium.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 #include "tests/fem/bar.h"
 

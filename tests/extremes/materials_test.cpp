@@ -1,6 +1,6 @@
 // Stiffness, density, Poisson's ratio, contrast and damping.
 
-#include "fem/models/free_system.h"
+#include "fem/models/detail/free_system.h"
 #include "tests/extremes/extremes.h"
 
 namespace sinew::tests {

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "fem/envelope.h"
+#include "fem/time/envelope.h"
 #include "tests/extremes/extremes.h"
 
 namespace sinew::tests {

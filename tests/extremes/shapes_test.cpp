@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "fem/models/springs.h"
+#include "fem/models/detail/springs.h"
 #include "lattice/check_cells.h"
 #include "tests/extremes/extremes.h"
 

@@ -5,12 +5,12 @@
 #include <tbb/global_control.h>
 
 #include "assets/pc2.h"
-#include "fem/models/green_strain.h"
-#include "fem/models/neo_hookean.h"
-#include "fem/models/newton_model.h"
-#include "fem/models/rotated_model.h"
-#include "fem/models/springs.h"
-#include "fem/placement.h"
+#include "fem/body/placement.h"
+#include "fem/models/detail/green_strain.h"
+#include "fem/models/detail/neo_hookean.h"
+#include "fem/models/detail/newton_model.h"
+#include "fem/models/detail/rotated_model.h"
+#include "fem/models/detail/springs.h"
 #include "tests/extremes/extremes.h"
 
 namespace sinew::tests {

@@ -6,8 +6,8 @@
 #include <map>
 #include <vector>
 
-#include "fem/body.h"
-#include "fem/simulation.h"
+#include "fem/body/body.h"
+#include "fem/time/simulation.h"
 #include "lattice/box.h"
 
 /// An arm of two hard bones along x in a box of flesh, 1 x 0.2 x 0.2 m: the smallest body with an elbow.

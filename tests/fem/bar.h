@@ -7,8 +7,8 @@
 
 #include <Eigen/Dense>
 
-#include "fem/body.h"
-#include "fem/factor.h"
+#include "fem/body/body.h"
+#include "fem/linear/factor.h"
 #include "lattice/box.h"
 
 /// A bar of box cells, made by hand: one region, no ties, full cells; its answers are known.

@@ -1,9 +1,9 @@
-#include "fem/blended_solver.h"
+#include "fem/models/detail/blended_solver.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 #include "tests/fem/bar.h"
 #include "tests/lattice/shapes.h"

@@ -1,4 +1,4 @@
-#include "fem/body.h"
+#include "fem/body/body.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,11 +6,11 @@
 
 #include <gtest/gtest.h>
 
-#include "fem/models/corotational_cells.h"
-#include "fem/models/green_strain.h"
-#include "fem/models/neo_hookean.h"
-#include "fem/models/springs.h"
-#include "fem/models/stvk.h"
+#include "fem/models/detail/corotational_cells.h"
+#include "fem/models/detail/green_strain.h"
+#include "fem/models/detail/neo_hookean.h"
+#include "fem/models/detail/springs.h"
+#include "fem/models/detail/stvk.h"
 #include "tests/fem/bar.h"
 
 namespace sinew::fem {

@@ -1,4 +1,4 @@
-#include "fem/cell_matrices.h"
+#include "fem/body/cell_matrices.h"
 
 #include <limits>
 

@@ -12,8 +12,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "fem/factor.h"
-#include "fem/models/repeated_factor.h"
+#include "fem/linear/factor.h"
+#include "fem/linear/repeated_factor.h"
 
 extern "C" {
 char* openblas_get_config();

@@ -1,4 +1,4 @@
-#include "fem/detail/couples.h"
+#include "fem/models/detail/couples.h"
 
 #include <random>
 

@@ -1,4 +1,4 @@
-#include "fem/cuts.h"
+#include "fem/time/cuts.h"
 
 #include <cmath>
 #include <functional>
@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "fem/envelope.h"
+#include "fem/time/envelope.h"
 #include "tests/fem/arm.h"
 
 namespace sinew::fem {

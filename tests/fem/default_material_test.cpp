@@ -1,10 +1,10 @@
-#include "fem/default_material.h"
+#include "fem/material/default_material.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "fem/joint_flesh.h"
+#include "fem/material/joint_flesh.h"
 
 namespace sinew::fem {
 namespace {

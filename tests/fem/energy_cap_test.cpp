@@ -1,12 +1,12 @@
-#include "fem/energy_cap.h"
+#include "fem/time/energy_cap.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "fem/measures.h"
-#include "fem/placement.h"
-#include "fem/simulation.h"
+#include "fem/body/placement.h"
+#include "fem/report/measures.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 
 namespace sinew::fem {

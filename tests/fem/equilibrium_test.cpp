@@ -1,5 +1,5 @@
 // Statics of every model: patch tests, rigid motion, closed forms through the solver, loads, failure.
-#include "fem/equilibrium.h"
+#include "fem/time/equilibrium.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "fem/cell_report.h"
 #include "fem/models/balance.h"
-#include "fem/models/springs.h"
-#include "fem/simulation.h"
+#include "fem/models/detail/springs.h"
+#include "fem/report/cell_report.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 #include "tests/fem/bar.h"
 

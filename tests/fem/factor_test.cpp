@@ -1,4 +1,4 @@
-#include "fem/factor.h"
+#include "fem/linear/factor.h"
 
 #include <cstdint>
 #include <vector>

@@ -1,10 +1,10 @@
-#include "fem/ghost_penalty.h"
+#include "fem/body/ghost_penalty.h"
 
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "fem/leaf_matrices.h"
+#include "fem/body/leaf_matrices.h"
 #include "lattice/box.h"
 #include "tests/lattice/lattices.h"
 

@@ -1,8 +1,8 @@
-#include "fem/growth.h"
+#include "fem/body/growth.h"
 
 #include <gtest/gtest.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 
 namespace sinew::fem {

@@ -1,4 +1,4 @@
-#include "fem/integrator.h"
+#include "fem/models/integrator.h"
 
 #include <cmath>
 #include <complex>
@@ -7,7 +7,7 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 #include "tests/fem/bar.h"
 

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fem/equilibrium.h"
-#include "fem/simulation.h"
+#include "fem/time/equilibrium.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 #include "tests/fem/bar.h"
 

@@ -1,4 +1,4 @@
-#include "fem/detail/large_pages.h"
+#include "fem/linear/large_pages.h"
 
 #include <algorithm>
 #include <cstdint>

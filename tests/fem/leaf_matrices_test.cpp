@@ -1,4 +1,4 @@
-#include "fem/leaf_matrices.h"
+#include "fem/body/leaf_matrices.h"
 
 #include <algorithm>
 #include <array>

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "lattice/build.h"
 #include "tests/fem/arm.h"
 #include "tests/lattice/limbs.h"

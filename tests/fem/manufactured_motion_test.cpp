@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/bar.h"
 #include "tests/publish.h"
 

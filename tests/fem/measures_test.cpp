@@ -1,4 +1,4 @@
-#include "fem/measures.h"
+#include "fem/report/measures.h"
 
 #include <algorithm>
 #include <limits>

@@ -6,9 +6,9 @@
 
 #include "assets/lattice_input.h"
 #include "assets/rig.h"
-#include "fem/body.h"
-#include "fem/default_material.h"
-#include "fem/simulation.h"
+#include "fem/body/body.h"
+#include "fem/material/default_material.h"
+#include "fem/time/simulation.h"
 #include "lattice/build.h"
 #include "tests/lattice/limbs.h"
 #include "tests/lattice/mirrored.h"

@@ -7,10 +7,10 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "fem/body/placement.h"
 #include "fem/models/cell_energy.h"
-#include "fem/models/collapse.h"
-#include "fem/placement.h"
-#include "fem/simulation.h"
+#include "fem/models/detail/collapse.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 #include "tests/fem/bar.h"
 

@@ -1,4 +1,4 @@
-#include "fem/detail/panels.h"
+#include "fem/linear/detail/panels.h"
 
 #include <random>
 

@@ -1,4 +1,4 @@
-#include "fem/phong_skin.h"
+#include "fem/body/phong_skin.h"
 
 #include <optional>
 

@@ -1,9 +1,9 @@
-#include "fem/rest_flesh.h"
+#include "fem/time/rest_flesh.h"
 
 #include <gtest/gtest.h>
 
-#include "fem/equilibrium.h"
-#include "fem/placement.h"
+#include "fem/body/placement.h"
+#include "fem/time/equilibrium.h"
 #include "tests/fem/arm.h"
 
 namespace sinew::fem {

@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "fem/placement.h"
-#include "fem/simulation.h"
+#include "fem/body/placement.h"
+#include "fem/time/simulation.h"
 #include "tests/fem/arm.h"
 
 namespace sinew::fem {

@@ -1,4 +1,4 @@
-#include "fem/simulation.h"
+#include "fem/time/simulation.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "fem/skin_guard.h"
+#include "fem/skin/skin_guard.h"
 
 #include <algorithm>
 #include <cmath>

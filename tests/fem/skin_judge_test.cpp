@@ -1,4 +1,4 @@
-#include "fem/skin_judge.h"
+#include "fem/skin/skin_judge.h"
 
 #include <cmath>
 #include <numbers>
@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "fem/detail/nearest_rotation.h"
-#include "fem/frames.h"
+#include "fem/body/frames.h"
+#include "fem/skin/detail/nearest_rotation.h"
 #include "tests/lattice/shapes.h"
 
 namespace sinew::fem {

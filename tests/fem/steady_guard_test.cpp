@@ -1,4 +1,4 @@
-#include "fem/steady_guard.h"
+#include "fem/skin/steady_guard.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fem/steady_weights.h"
+#include "fem/skin/steady_weights.h"
 #include "tests/fem/sheet.h"
 
 namespace sinew::fem {

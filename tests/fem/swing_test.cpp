@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fem/default_material.h"
+#include "fem/material/default_material.h"
 #include "lattice/build.h"
 #include "tests/fem/bar.h"
 #include "tests/lattice/limbs.h"

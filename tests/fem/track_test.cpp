@@ -1,4 +1,4 @@
-#include "fem/track.h"
+#include "fem/time/track.h"
 
 #include <gtest/gtest.h>
 

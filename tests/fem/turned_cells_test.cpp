@@ -1,4 +1,4 @@
-#include "fem/detail/turned_cells.h"
+#include "fem/models/detail/turned_cells.h"
 
 #include <random>
 

@@ -10,8 +10,8 @@
 #include "assets/error.h"
 #include "assets/sidecar.h"
 #include "tests/tools/simulate_run.h"
-#include "tools/comparison.h"
-#include "tools/tolerance.h"
+#include "tools/ladder/comparison.h"
+#include "tools/ladder/tolerance.h"
 
 namespace sinew::tools {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "fem/measures.h"
-#include "tools/character.h"
+#include "fem/report/measures.h"
+#include "tools/session/character.h"
 
 namespace sinew::tools {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/inspect_command.h"
+#include "tools/commands/inspect_command.h"
 
 #include <cstdio>
 #include <fstream>

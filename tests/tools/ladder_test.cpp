@@ -1,6 +1,6 @@
 // sinew ladder: its choices on made-up runs, and one small grid as the shell sees it.
 
-#include "tools/ladder.h"
+#include "tools/ladder/ladder.h"
 
 #include <cmath>
 #include <filesystem>
@@ -12,8 +12,8 @@
 #include "assets/figure.h"
 #include "fem/models/model.h"
 #include "tests/tools/simulate_run.h"
-#include "tools/ladder_cost.h"
-#include "tools/ladder_report.h"
+#include "tools/ladder/ladder_cost.h"
+#include "tools/ladder/ladder_report.h"
 
 namespace sinew::tools {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "fem/equilibrium.h"
-#include "tools/character.h"
+#include "fem/time/equilibrium.h"
+#include "tools/session/character.h"
 
 /// The skin of bundled samples on any rung of the ladder, held in a pose or moving.
 namespace sinew::tests {

@@ -1,6 +1,6 @@
 // Scenes without a rig: what their files say, how they are refused, and the answers of small ones.
 
-#include "tools/plain_scene.h"
+#include "tools/scene/plain_scene.h"
 
 #include <cmath>
 #include <filesystem>
@@ -13,9 +13,9 @@
 #include "assets/error.h"
 #include "assets/vtu.h"
 #include "tests/tools/simulate_run.h"
-#include "tools/character.h"
-#include "tools/plain_character.h"
-#include "tools/scene.h"
+#include "tools/scene/scene.h"
+#include "tools/session/character.h"
+#include "tools/session/plain_character.h"
 
 namespace sinew::tools {
 namespace {

@@ -7,8 +7,8 @@
 #include "fem/models/model.h"
 #include "tests/comma_locale.h"
 #include "tests/tools/scene_file.h"
-#include "tools/scene.h"
-#include "tools/scene_fields.h"
+#include "tools/scene/scene.h"
+#include "tools/scene/scene_fields.h"
 
 /// Scenes printed as files and read again.
 namespace sinew::tools {

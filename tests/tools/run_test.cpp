@@ -1,7 +1,7 @@
 // The front of the command: exit codes, one line per failure, suggestions, signals. The binary itself is run
 // where the shell's view matters.
 
-#include "tools/run.h"
+#include "tools/shell/run.h"
 
 #include <csignal>
 #include <cstdio>
@@ -17,11 +17,11 @@
 
 #include "assets/error.h"
 #include "tests/tools/run_command.h"
-#include "tools/exit_code.h"
-#include "tools/failure.h"
-#include "tools/interrupt.h"
-#include "tools/progress.h"
-#include "tools/suggest.h"
+#include "tools/support/exit_code.h"
+#include "tools/support/failure.h"
+#include "tools/support/interrupt.h"
+#include "tools/support/progress.h"
+#include "tools/support/suggest.h"
 
 namespace sinew::tools {
 namespace {

@@ -3,10 +3,10 @@
 #include <memory>
 #include <string>
 
-#include "fem/equilibrium.h"
-#include "tools/character.h"
-#include "tools/plain_loads.h"
-#include "tools/scene.h"
+#include "fem/time/equilibrium.h"
+#include "tools/scene/scene.h"
+#include "tools/session/character.h"
+#include "tools/session/plain_loads.h"
 
 /// The body of a scene of tests/scenes, for what no command asks of it.
 namespace sinew::tests {

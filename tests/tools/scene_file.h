@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "assets/error.h"
-#include "tools/scene.h"
+#include "tools/scene/scene.h"
 
 namespace sinew::tools {
 

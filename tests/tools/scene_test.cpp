@@ -1,4 +1,4 @@
-#include "tools/scene.h"
+#include "tools/scene/scene.h"
 
 #include <filesystem>
 #include <functional>
@@ -9,7 +9,7 @@
 #include "assets/error.h"
 #include "fem/models/model.h"
 #include "tests/tools/scene_file.h"
-#include "tools/scene_fields.h"
+#include "tools/scene/scene_fields.h"
 
 namespace sinew::tools {
 namespace {

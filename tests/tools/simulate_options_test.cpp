@@ -1,4 +1,4 @@
-#include "tools/simulate_options.h"
+#include "tools/commands/simulate_options.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 #include "assets/error.h"
 #include "fem/models/model.h"
-#include "tools/scene_fields.h"
+#include "tools/scene/scene_fields.h"
 
 namespace sinew::tools {
 namespace {

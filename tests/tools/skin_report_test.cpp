@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "assets/rig.h"
-#include "fem/skin_judge.h"
+#include "fem/skin/skin_judge.h"
 #include "skeleton/clip.h"
 #include "tests/tools/simulate_run.h"
 

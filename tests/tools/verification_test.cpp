@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "fem/cell_report.h"
-#include "fem/simulation.h"
+#include "fem/report/cell_report.h"
+#include "fem/time/simulation.h"
 #include "tests/analytic.h"
 #include "tests/fem/bar.h"
 #include "tests/publish.h"
