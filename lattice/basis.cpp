@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace sinew::lattice {
@@ -160,6 +161,27 @@ LeafMesh restrict_cells(const Hierarchy& hierarchy, const LeafMesh& mesh,
 int coarse_cell(const Hierarchy& hierarchy, const LeafMesh& mesh, int cell) {
   const auto c = static_cast<std::size_t>(cell);
   return hierarchy.coarse_cell(mesh.hex[c] >> (3 * (mesh.level[c] - 1)));
+}
+
+Points carried_values(const Hierarchy& hierarchy, const LeafMesh& from, const LeafMesh& to,
+                      const Points& values) {
+  std::vector<std::uint8_t> known(static_cast<std::size_t>(hierarchy.num_vertices()), 0);
+  Points all = Points::Zero(hierarchy.num_vertices(), 3);
+  for (int a = 0; a < from.num_vertices(); ++a) {
+    const int vertex = from.vertices[static_cast<std::size_t>(a)];
+    known[static_cast<std::size_t>(vertex)] = 1;
+    all.row(vertex) = values.row(a);
+  }
+  for (int vertex : to.vertices) {
+    if (hierarchy.level(vertex) == 0 && !known[static_cast<std::size_t>(vertex)])
+      throw std::invalid_argument("leaf meshes: vertex " + std::to_string(vertex) +
+                                  " of level 0 is in one of them only, expected two sets of one flesh");
+  }
+  fill_inactive(hierarchy, known, all);
+  Points carried(to.num_vertices(), 3);
+  for (int a = 0; a < to.num_vertices(); ++a)
+    carried.row(a) = all.row(to.vertices[static_cast<std::size_t>(a)]);
+  return carried;
 }
 
 }  // namespace sinew::lattice

@@ -54,4 +54,10 @@ LeafMesh leaf_mesh(const Hierarchy& hierarchy, const ActiveSet& active);
 /// vertices and functions that no kept cell touches leave as well. Level-0 functions of kept cells stay.
 LeafMesh restrict_cells(const Hierarchy& hierarchy, const LeafMesh& mesh, std::span<const std::uint8_t> keep);
 
+/// Leaf values on another leaf mesh of the hierarchy: shared vertices keep theirs, a vertex that is new has
+/// the mean of its parents', coarse to fine. values: from.num_vertices() x 3; the result to.num_vertices()
+/// x 3. Throws std::invalid_argument where `to` has a vertex of level 0 that `from` has not.
+Points carried_values(const Hierarchy& hierarchy, const LeafMesh& from, const LeafMesh& to,
+                      const Points& values);
+
 }  // namespace sinew::lattice

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "fem/body/body.h"
 #include "fem/models/stage_problem.h"
 
@@ -42,6 +44,16 @@ struct PoseProblem {
   const lattice::Points* force = nullptr;  ///< further forces on the leaf vertices [N]; null for none.
 };
 
+/// What a model keeps of stages that it has solved and that later results depend on, to the last bit.
+struct ModelMemory {
+  /// A system whose factor still preconditions: enough to make that very factor again.
+  struct EarlierSystem {
+    double inertia = -1.0, damping = -1.0;   ///< of the balance (fem/models/balance.h); -1: there is none.
+    std::vector<Eigen::Matrix3d> rotations;  ///< of the leaf cells.
+  };
+  std::vector<EarlierSystem> systems;
+};
+
 /// Elastic energy and forces of every leaf cell.
 struct CellForces {
   std::vector<double> energy;     ///< [J].
@@ -73,6 +85,11 @@ class Model {
   virtual bool may_gain_energy() const { return false; }
 
   virtual SolverCounts counts() const = 0;
+
+  /// All that a solve depends on besides its problem; empty where there is no such thing.
+  virtual ModelMemory memory() const { return {}; }
+  /// Goes on as the model of the same body and options did that had this memory; an empty one: as a new one.
+  virtual SolveReport recall(const ModelMemory&) { return {}; }
 };
 
 /// A line of the registry.

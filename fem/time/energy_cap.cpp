@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace sinew::fem {
 namespace {
@@ -24,30 +25,37 @@ bool stand_still(const Body& body, const PosedFrames& now, const PosedFrames& ne
 void EnergyCap::limit(const State& before, const PosedFrames& now, const PosedFrames& next,
                       const lattice::Points* force, State& after) {
   if (!stand_still(body_, now, next)) {
-    stored_.reset();
+    forget();
     return;
   }
-  if (!stored_) {
+  double& cap = memory_.cap;
+  if (!memory_.still) {
+    memory_.still = next;
     stored_.emplace(body_, next, gravity_);
-    cap_ = kinetic_energy(body_, before.v) + stored_->of(before.x);
+    cap = kinetic_energy(body_, before.v) + stored_->of(before.x);
   }
-  if (force != nullptr) cap_ += force->cwiseProduct(after.x - before.x).sum();
+  if (force != nullptr) cap += force->cwiseProduct(after.x - before.x).sum();
 
   const double kinetic = kinetic_energy(body_, after.v), stored = stored_->of(after.x);
-  if (kinetic + stored <= cap_) return;
-  ++taken_.steps;
-  if (stored <= cap_) {
-    after.v *= std::sqrt((cap_ - stored) / kinetic);
-    taken_.energy += kinetic + stored - cap_;
+  if (kinetic + stored <= cap) return;
+  ++memory_.taken.steps;
+  if (stored <= cap) {
+    after.v *= std::sqrt((cap - stored) / kinetic);
+    memory_.taken.energy += kinetic + stored - cap;
     return;
   }
   // Stored energy is convex in the places of flesh in one pose, so that on the line between two places it is
   // at most what lies on the line between their energies.
   const double begin = stored_->of(before.x);
-  const double share = std::clamp((cap_ - begin) / (stored - begin), 0.0, 1.0);
+  const double share = std::clamp((cap - begin) / (stored - begin), 0.0, 1.0);
   after.x = before.x + share * (after.x - before.x);
   after.v.setZero();
-  taken_.energy += kinetic + stored - stored_->of(after.x);
+  memory_.taken.energy += kinetic + stored - stored_->of(after.x);
+}
+
+void EnergyCap::recall(Memory memory) {
+  memory_ = std::move(memory);
+  if (memory_.still) stored_.emplace(body_, *memory_.still, gravity_);
 }
 
 }  // namespace sinew::fem

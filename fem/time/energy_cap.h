@@ -20,6 +20,13 @@ class EnergyCap {
     double energy = 0.0;  ///< [J].
   };
 
+  /// All that the cap goes on from.
+  struct Memory {
+    std::optional<PosedFrames> still;  ///< the pose of bones that stand still; empty while they move.
+    double cap = 0.0;                  ///< [J].
+    Taken taken;
+  };
+
   /// `body` must outlive the cap.
   EnergyCap(const Body& body, const Eigen::Vector3d& gravity) : body_(body), gravity_(gravity) {}
 
@@ -31,16 +38,17 @@ class EnergyCap {
              const lattice::Points* force, State& after);
 
   /// The bones jumped: what the flesh had before says nothing any more.
-  void forget() { stored_.reset(); }
+  void forget() { memory_.still.reset(); }
 
-  const Taken& taken() const { return taken_; }
+  const Taken& taken() const { return memory_.taken; }
+  const Memory& memory() const { return memory_; }
+  void recall(Memory memory);
 
  private:
   const Body& body_;
   Eigen::Vector3d gravity_;
-  std::optional<StoredEnergy> stored_;  ///< in the pose of bones that stand still; empty while they move.
-  double cap_ = 0.0;                    ///< [J].
-  Taken taken_;
+  Memory memory_;
+  std::optional<StoredEnergy> stored_;  ///< in the pose of bones that stand still.
 };
 
 }  // namespace sinew::fem

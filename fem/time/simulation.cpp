@@ -14,7 +14,6 @@ using lattice::Points;
 
 namespace {
 
-constexpr int kMostHalvings = 8;           ///< of a step: for fast frames and for solves that fail.
 constexpr double kLongestInterval = 0.05;  ///< between keys that show accelerations [s].
 constexpr int kStepsBetweenChanges = 10;   ///< before a longer step: what turned fast may go on to.
 
@@ -64,8 +63,7 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
       should_stop_(std::move(should_stop)),
       info_(model_named(options.model)),
       model_(info_->make(body, options.solver)),
-      loads_(body, options.loads),
-      start_(start_time) {
+      loads_(body, options.loads) {
   options_.validate();
   // Flesh without inertia stands at the end of every step; a start of BDF2 would extrapolate beyond it.
   if (!info_->dynamic) options_.integrator = Integrator::BackwardEuler;
@@ -78,13 +76,14 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
         " regions; hint: bdf2, or another --model such as corotational");
   }
   if (model_->may_gain_energy()) energy_cap_.emplace(body, options_.gravity);
-  longest_ = options_.step;
-  now_ = pose_at(start_time);
-  past_ = now_;
-  state_.time = start_time;
-  state_.x = skinned_positions(body_, now_);
-  state_.v = Points::Zero(state_.x.rows(), 3);
-  before_ = state_;
+  moving_.counter.start = start_time;
+  moving_.counter.step = moving_.counter.longest = options_.step;
+  moving_.now = pose_at(start_time);
+  moving_.past = moving_.now;
+  moving_.flesh.time = start_time;
+  moving_.flesh.x = skinned_positions(body_, moving_.now);
+  moving_.flesh.v = Points::Zero(moving_.flesh.x.rows(), 3);
+  moving_.before = moving_.flesh;
 }
 
 PosedFrames Simulation::pose_at(double time) const {
@@ -99,8 +98,8 @@ SimulationReport Simulation::failed(const SolveReport& solve) const {
   SimulationReport report;
   report.status = solve.status == SolveStatus::NotPositiveDefinite ? SimulationStatus::NotPositiveDefinite
                                                                    : SimulationStatus::NoConvergence;
-  report.time = state_.time;
-  report.message = solve.message + " at " + std::to_string(state_.time) + " s";
+  report.time = moving_.flesh.time;
+  report.message = solve.message + " at " + std::to_string(moving_.flesh.time) + " s";
   return report;
 }
 
@@ -118,16 +117,16 @@ std::string Simulation::joint_of(int vertex) const {
 
 bool Simulation::check(SimulationReport& report) const {
   int worst = -1;
-  for (Eigen::Index a = 0; a < state_.x.rows() && worst < 0; ++a) {
-    const bool finite = state_.x.row(a).allFinite() && state_.v.row(a).allFinite();
+  for (Eigen::Index a = 0; a < moving_.flesh.x.rows() && worst < 0; ++a) {
+    const bool finite = moving_.flesh.x.row(a).allFinite() && moving_.flesh.v.row(a).allFinite();
     if (!finite) worst = static_cast<int>(a);
   }
   // Flesh a hundred lengths from its bones has left for good; say so while the numbers still name a place.
   if (worst < 0) {
-    const Points home = skinned_frames(body_, now_);
+    const Points home = skinned_frames(body_, moving_.now);
     double farthest = 0.0;
-    for (Eigen::Index a = 0; a < state_.x.rows(); ++a) {
-      const double distance = (state_.x.row(a) - home.row(a)).norm();
+    for (Eigen::Index a = 0; a < moving_.flesh.x.rows(); ++a) {
+      const double distance = (moving_.flesh.x.row(a) - home.row(a)).norm();
       if (distance > farthest) {
         farthest = distance;
         if (distance > 100.0 * body_.size) worst = static_cast<int>(a);
@@ -136,14 +135,15 @@ bool Simulation::check(SimulationReport& report) const {
   }
   if (worst < 0) return true;
   report.status = SimulationStatus::Diverged;
-  report.message = "the flesh of '" + joint_of(worst) + "' diverged at " + std::to_string(state_.time) +
+  report.message = "the flesh of '" + joint_of(worst) + "' diverged at " +
+                   std::to_string(moving_.flesh.time) +
                    " s; a smaller --step, more --damping or --integrator backward-euler helps";
   return false;
 }
 
 SimulationReport Simulation::settle() {
   SimulationReport report;
-  report.time = state_.time;
+  report.time = moving_.flesh.time;
   // At most one and a half stages at once: a stiff mode that is carried twice as far never comes to rest.
   const double span = std::min(1.0, 1.5 * stage_of(options_.integrator).eta);
   const long limit =
@@ -152,21 +152,22 @@ SimulationReport Simulation::settle() {
   const Beginning begin = beginning();
   if (limit > 0) {
     if (!begin.acceleration.isZero(0.0)) inertial_force_ = -mass_times(body_, begin.acceleration);
-    state_.x = guessed_rest();
+    moving_.flesh.x = guessed_rest();
   }
-  PosedFrames earlier = now_, later = now_;
+  PosedFrames earlier = moving_.now, later = moving_.now;
   Points v;
   int halvings = 0, good_steps = 0;
   report.settled = limit == 0;
   for (long n = 0; n < limit; ++n) {
     const double h = options_.step * std::exp2(-halvings);
-    earlier.time = now_.time - h;
-    later.time = now_.time + h;
+    earlier.time = moving_.now.time - h;
+    later.time = moving_.now.time + h;
     SolveReport solve = model_->prepare(h, options_.integrator);
     if (solve.ok())
-      solve = model_->solve_stage(stage(state_, state_.x, state_.v, {&earlier, &now_, &later},
-                                        stage_of(options_.integrator).eta * h, h, start_),
-                                  v);
+      solve = model_->solve_stage(
+          stage(moving_.flesh, moving_.flesh.x, moving_.flesh.v, {&earlier, &moving_.now, &later},
+                stage_of(options_.integrator).eta * h, h, moving_.counter.start),
+          v);
     if (solve.status == SolveStatus::NoConvergence && halvings < kMostHalvings) {
       ++halvings;
       good_steps = 0;
@@ -178,9 +179,9 @@ SimulationReport Simulation::settle() {
     }
     // Implicit drag at the critical rate 2 w0: the equilibrium is that of the run's own matrices.
     const double keep = 1.0 / (1.0 + 4.0 * std::numbers::pi * body_.damping.frequency * h);
-    state_.x += span * h * v;
-    state_.v = keep * v;
-    place_bones(body_, now_, state_.x);
+    moving_.flesh.x += span * h * v;
+    moving_.flesh.v = keep * v;
+    place_bones(body_, moving_.now, moving_.flesh.x);
     ++report.steps;
     Eigen::Index fastest = 0;
     report.speed = v.rowwise().norm().maxCoeff(&fastest);
@@ -199,8 +200,8 @@ SimulationReport Simulation::settle() {
     if (report.settled) break;
   }
   inertial_force_.resize(0, 3);
-  state_.v = begin.velocity;
-  before_ = state_;
+  moving_.flesh.v = begin.velocity;
+  moving_.before = moving_.flesh;
   return report;
 }
 
@@ -211,16 +212,16 @@ Simulation::Beginning Simulation::beginning() const {
   constexpr double kRounding = 1e-12;  // of places
   const double eta_h = stage_of(options_.integrator).eta * options_.step;
   const double interval = std::max(options_.step, options_.key_interval);
-  Beginning begin{Points::Zero(state_.x.rows(), 3), Points::Zero(state_.x.rows(), 3)};
-  if (touches_cut(options_.cuts, start_, start_ + eta_h)) return begin;
+  Beginning begin{Points::Zero(moving_.flesh.x.rows(), 3), Points::Zero(moving_.flesh.x.rows(), 3)};
+  if (touches_cut(options_.cuts, moving_.counter.start, moving_.counter.start + eta_h)) return begin;
   // The motion may start at full speed: flesh that moves with its bones feels no jolt.
   begin.velocity = riding_velocity(eta_h);
   if (!info_->dynamic || interval > kLongestInterval ||
-      touches_cut(options_.cuts, start_, start_ + 3.0 * interval))
+      touches_cut(options_.cuts, moving_.counter.start, moving_.counter.start + 3.0 * interval))
     return begin;
   const auto at = [&](int keys) {
-    const PosedFrames posed = pose_at(start_ + keys * interval);
-    Points x = carried(body_, state_.x, now_, posed);
+    const PosedFrames posed = pose_at(moving_.counter.start + keys * interval);
+    Points x = carried(body_, moving_.flesh.x, moving_.now, posed);
     place_bones(body_, posed, x);
     return x;
   };
@@ -232,9 +233,9 @@ Simulation::Beginning Simulation::beginning() const {
   } catch (const std::invalid_argument&) {
     return begin;  // a clip that soon hides the body ends before that, and has no time to show accelerations
   }
-  const double rounding = kRounding * (body_.size + state_.x.cwiseAbs().maxCoeff());
+  const double rounding = kRounding * (body_.size + moving_.flesh.x.cwiseAbs().maxCoeff());
   for (Eigen::Index a = 0; a < x1.rows(); ++a) {
-    const Eigen::RowVector3d first = state_.x.row(a) - 2.0 * x1.row(a) + x2.row(a);
+    const Eigen::RowVector3d first = moving_.flesh.x.row(a) - 2.0 * x1.row(a) + x2.row(a);
     const Eigen::RowVector3d second = x1.row(a) - 2.0 * x2.row(a) + x3.row(a);
     if (!(first.dot(second) > rounding * std::max(first.norm(), second.norm()))) continue;
     const double lasts = first.dot(second) / std::max(first.squaredNorm(), second.squaredNorm());
@@ -243,7 +244,8 @@ Simulation::Beginning Simulation::beginning() const {
     const Eigen::RowVector3d change = lasts * (second - first);
     const Eigen::RowVector3d acceleration = (first - change) / (interval * interval);
     const Eigen::RowVector3d tangent =
-        (x1.row(a) - state_.x.row(a) - first / 2.0 + change / 3.0) / interval - 0.5 * eta_h * acceleration;
+        (x1.row(a) - moving_.flesh.x.row(a) - first / 2.0 + change / 3.0) / interval -
+        0.5 * eta_h * acceleration;
     begin.acceleration.row(a) = lasts * acceleration;
     begin.velocity.row(a) += lasts * (tangent - begin.velocity.row(a));
   }
@@ -260,52 +262,52 @@ Points Simulation::guessed_rest() const {
   SolverOptions exact = options_.solver;
   exact.precision = Precision::Double;
   const std::unique_ptr<Model> linear = find_model(kLinear)->make(body_, exact);
-  Points sum = inertial_force_.rows() > 0 ? inertial_force_ : Points::Zero(state_.x.rows(), 3);
-  if (!options_.loads.empty()) sum += loads_.at(state_.x);
-  if (options_.force) sum += options_.force(start_);
-  Points x = state_.x;
-  const bool found = linear->equilibrate({&now_, options_.gravity, &sum}, x).ok() && x.allFinite();
+  Points sum = inertial_force_.rows() > 0 ? inertial_force_ : Points::Zero(moving_.flesh.x.rows(), 3);
+  if (!options_.loads.empty()) sum += loads_.at(moving_.flesh.x);
+  if (options_.force) sum += options_.force(moving_.counter.start);
+  Points x = moving_.flesh.x;
+  const bool found = linear->equilibrate({&moving_.now, options_.gravity, &sum}, x).ok() && x.allFinite();
   const bool same_law = info_->name == kLinear || model_->linear_in_frames();
-  if (!found || (x - state_.x).cwiseAbs().maxCoeff() > body_.size) return state_.x;
-  if (!same_law && least_stretch(body_, x).stretch < kLeastStretch) return state_.x;
+  if (!found || (x - moving_.flesh.x).cwiseAbs().maxCoeff() > body_.size) return moving_.flesh.x;
+  if (!same_law && least_stretch(body_, x).stretch < kLeastStretch) return moving_.flesh.x;
   return x;
 }
 
 Points Simulation::riding_velocity(double span) const {
-  const PosedFrames next = pose_at(state_.time + span);
-  Points v = (carried(body_, state_.x, now_, next) - state_.x) / span;
+  const PosedFrames next = pose_at(moving_.flesh.time + span);
+  Points v = (carried(body_, moving_.flesh.x, moving_.now, next) - moving_.flesh.x) / span;
   for (const BoneVertex& bone : body_.bones.vertices) {
     v.row(bone.vertex) =
-        (bone_position(bone, next.joints) - bone_position(bone, now_.joints)).transpose() / span;
+        (bone_position(bone, next.joints) - bone_position(bone, moving_.now.joints)).transpose() / span;
   }
   fill_inactive_leaves(body_, v);
   return v;
 }
 
 void Simulation::set_velocity(const Points& velocity) {
-  step_end_.reset();
+  moving_.step_end.reset();
   Points v = velocity;
-  for (const BoneVertex& bone : body_.bones.vertices) v.row(bone.vertex) = state_.v.row(bone.vertex);
+  for (const BoneVertex& bone : body_.bones.vertices) v.row(bone.vertex) = moving_.flesh.v.row(bone.vertex);
   fill_inactive_leaves(body_, v);
-  state_.v = before_.v = v;
+  moving_.flesh.v = moving_.before.v = v;
 }
 
 void Simulation::set_step(double step) {
   SimulationOptions changed = options_;
   changed.step = step;
   changed.validate();
-  options_.step = step;
-  longest_ = std::max(longest_, step);
-  start_ = state_.time;
-  base_step_ = 0;
-  part_ = 0;
+  options_.step = moving_.counter.step = step;
+  moving_.counter.longest = std::max(moving_.counter.longest, step);
+  moving_.counter.start = moving_.flesh.time;
+  moving_.counter.whole = 0;
+  moving_.counter.part = 0;
 }
 
 int Simulation::halvings_for(double begin, double h) const {
   if (!info_->dynamic) return 0;
   constexpr int kSamples = 4;  // a full turn within one step must not look like standing still
   std::vector<double> angle(body_.tree.frames.size(), 0.0);
-  PosedFrames previous = now_;
+  PosedFrames previous = moving_.now;
   for (int k = 1; k <= kSamples; ++k) {
     const PosedFrames next = pose_at(begin + h * k / kSamples);
     for (std::size_t f = 0; f < angle.size(); ++f) {
@@ -324,7 +326,7 @@ int Simulation::halvings_for(double begin, double h) const {
 bool Simulation::jumps_to(const PosedFrames& next) const {
   for (std::size_t f = 0; f < next.frames.size(); ++f) {
     const Eigen::Vector3d& origin = body_.tree.frames[f].origin_rest;
-    if ((next.frames[f].from_rest * origin - now_.frames[f].from_rest * origin).norm() >
+    if ((next.frames[f].from_rest * origin - moving_.now.frames[f].from_rest * origin).norm() >
         kCutJump * body_.size)
       return true;
   }
@@ -332,41 +334,44 @@ bool Simulation::jumps_to(const PosedFrames& next) const {
 }
 
 void Simulation::forget_history() {
-  state_.x_past.resize(0, 3);
-  state_.v_past.resize(0, 3);
-  state_.a.resize(0, 3);
-  step_end_.reset();
-  has_before_ = false;
-  track_.clear();
+  moving_.flesh.x_past.resize(0, 3);
+  moving_.flesh.v_past.resize(0, 3);
+  moving_.flesh.a.resize(0, 3);
+  moving_.step_end.reset();
+  moving_.has_before = false;
+  moving_.track.clear();
   if (energy_cap_) energy_cap_->forget();
 }
 
 SimulationReport Simulation::carry_through_cut() {
-  const double h = options_.step, begin = state_.time;
-  if (!relative_velocity_) {
+  const double h = options_.step, begin = moving_.flesh.time;
+  if (!moving_.relative_velocity) {
     // Before the first step nothing is known of the frames' velocity, and settled flesh has none.
-    relative_velocity_ = state_.v;
-    if (has_before_) *relative_velocity_ -= (state_.x - carried(body_, state_.x, now_, past_)) / last_h_;
+    moving_.relative_velocity = moving_.flesh.v;
+    if (moving_.has_before)
+      *moving_.relative_velocity -=
+          (moving_.flesh.x - carried(body_, moving_.flesh.x, moving_.now, moving_.past)) / moving_.last_h;
   }
   PosedFrames next = pose_at(begin + h);
-  before_ = state_;
-  state_.time = next.time;
-  state_.x = carried(body_, state_.x, now_, next);
-  place_bones(body_, next, state_.x);
-  fill_inactive_leaves(body_, state_.x);
-  state_.v = *relative_velocity_ = turned(body_, *relative_velocity_, now_, next);
-  past_ = std::move(now_);
-  now_ = std::move(next);
+  moving_.before = moving_.flesh;
+  moving_.flesh.time = next.time;
+  moving_.flesh.x = carried(body_, moving_.flesh.x, moving_.now, next);
+  place_bones(body_, next, moving_.flesh.x);
+  fill_inactive_leaves(body_, moving_.flesh.x);
+  moving_.flesh.v = *moving_.relative_velocity = turned(body_, *moving_.relative_velocity, moving_.now, next);
+  moving_.past = std::move(moving_.now);
+  moving_.now = std::move(next);
   forget_history();
-  if (!touches_cut(options_.cuts, now_.time, now_.time + h)) {
+  if (!touches_cut(options_.cuts, moving_.now.time, moving_.now.time + h)) {
     const Points riding = riding_velocity(stage_of(options_.integrator).eta * h);
-    state_.v += riding;
-    for (const BoneVertex& bone : body_.bones.vertices) state_.v.row(bone.vertex) = riding.row(bone.vertex);
-    fill_inactive_leaves(body_, state_.v);
-    relative_velocity_.reset();
+    moving_.flesh.v += riding;
+    for (const BoneVertex& bone : body_.bones.vertices)
+      moving_.flesh.v.row(bone.vertex) = riding.row(bone.vertex);
+    fill_inactive_leaves(body_, moving_.flesh.v);
+    moving_.relative_velocity.reset();
   }
   SimulationReport report;
-  report.time = state_.time;
+  report.time = moving_.flesh.time;
   report.steps = 1;
   check(report);
   return report;
@@ -374,43 +379,33 @@ SimulationReport Simulation::carry_through_cut() {
 
 /// The step begins where the frames land, with flesh that stands among them as before, and they stand still.
 SimulationReport Simulation::step_after_cut(double h, const PosedFrames& next) {
-  const State state = state_;
-  const PosedFrames now = now_, past = past_;
-  const std::optional<StepEnd> step_end = step_end_;
-  const bool has_before = has_before_;
-  const Track track = track_;
-
-  now_ = next;
-  now_.time = now.time;
-  state_.x = carried(body_, state.x, now, now_);
-  place_bones(body_, now_, state_.x);
-  fill_inactive_leaves(body_, state_.x);
-  state_.v = turned(body_, state.v, now, now_);
+  const MovingState earlier = moving_;
+  moving_.now = next;
+  moving_.now.time = earlier.now.time;
+  moving_.flesh.x = carried(body_, earlier.flesh.x, earlier.now, moving_.now);
+  place_bones(body_, moving_.now, moving_.flesh.x);
+  fill_inactive_leaves(body_, moving_.flesh.x);
+  moving_.flesh.v = turned(body_, earlier.flesh.v, earlier.now, moving_.now);
   forget_history();
   held_ = next;
   const SimulationReport report = step_once(h);
   held_.reset();
   if (report.steps == 1) {
-    track_.clear();  // the clip's poses within this step are not those that the flesh saw
+    moving_.track.clear();  // the clip's poses within this step are not those that the flesh saw
     return report;
   }
-  state_ = state;
-  now_ = now;
-  past_ = past;
-  step_end_ = step_end;
-  has_before_ = has_before;
-  track_ = track;
+  moving_ = earlier;
   return report;
 }
 
 SimulationReport Simulation::step_once(double h) {
-  PosedFrames next = pose_at(state_.time + h);
+  PosedFrames next = pose_at(moving_.flesh.time + h);
   if (info_->dynamic && jumps_to(next)) return step_after_cut(h, next);
   SimulationReport report;
   SolveReport solve = model_->prepare(h, options_.integrator);
   if (!solve.ok()) return failed(solve);
   State after;
-  after.time = state_.time + h;
+  after.time = moving_.flesh.time + h;
   switch (options_.integrator) {
     case Integrator::Bdf2:
       solve = bdf2_step(h, next, after);
@@ -422,28 +417,29 @@ SimulationReport Simulation::step_once(double h) {
       solve = tr_bdf2_step(h, next, after);
       break;
     case Integrator::BackwardEuler:
-      solve = model_->solve_stage(
-          stage(state_, state_.x, state_.v, {before_pose(), &now_, &next}, h, h, next.time), after.v);
+      solve = model_->solve_stage(stage(moving_.flesh, moving_.flesh.x, moving_.flesh.v,
+                                        {before_pose(), &moving_.now, &next}, h, h, next.time),
+                                  after.v);
       if (!solve.ok()) break;
-      after.x = state_.x + h * after.v;
+      after.x = moving_.flesh.x + h * after.v;
       place_bones(body_, next, after.x);
       break;
   }
   if (!solve.ok()) return failed(solve);
   if (energy_cap_) {
     const bool pushed = !options_.loads.empty() || options_.force;
-    energy_cap_->limit(state_, now_, next, pushed ? &force_ : nullptr, after);
+    energy_cap_->limit(moving_.flesh, moving_.now, next, pushed ? &force_ : nullptr, after);
   }
-  if (options_.integrator == Integrator::Bdf2) track_.pass(state_, longest_);
-  before_ = state_;
-  after.x_past = state_.x;
-  after.v_past = state_.v;
-  state_ = std::move(after);
-  past_ = std::move(now_);
-  now_ = std::move(next);
-  has_before_ = true;
-  last_h_ = h;
-  report.time = state_.time;
+  if (options_.integrator == Integrator::Bdf2) moving_.track.pass(moving_.flesh, moving_.counter.longest);
+  moving_.before = moving_.flesh;
+  after.x_past = moving_.flesh.x;
+  after.v_past = moving_.flesh.v;
+  moving_.flesh = std::move(after);
+  moving_.past = std::move(moving_.now);
+  moving_.now = std::move(next);
+  moving_.has_before = true;
+  moving_.last_h = h;
+  report.time = moving_.flesh.time;
   report.steps = 1;
   check(report);
   return report;
@@ -451,40 +447,43 @@ SimulationReport Simulation::step_once(double h) {
 
 SimulationReport Simulation::advance_to(double time) {
   SimulationReport total;
-  total.time = state_.time;
-  while (state_.time < time) {
-    if (part_ == 0) {
-      state_.time = now_.time = start_ + static_cast<double>(base_step_) * options_.step;
+  total.time = moving_.flesh.time;
+  while (moving_.flesh.time < time) {
+    if (moving_.counter.part == 0) {
+      moving_.flesh.time = moving_.now.time =
+          moving_.counter.start + static_cast<double>(moving_.counter.whole) * options_.step;
     }
-    const bool in_cut =
-        part_ == 0 && info_->dynamic && touches_cut(options_.cuts, state_.time, state_.time + options_.step);
-    if (part_ == 0 && !in_cut) {
-      const int wanted = halvings_for(state_.time, options_.step);
-      if (wanted > halvings_ || (wanted < halvings_ && steps_since_change_ >= kStepsBetweenChanges)) {
-        halvings_ = wanted;
-        steps_since_change_ = 0;
+    const bool in_cut = moving_.counter.part == 0 && info_->dynamic &&
+                        touches_cut(options_.cuts, moving_.flesh.time, moving_.flesh.time + options_.step);
+    if (moving_.counter.part == 0 && !in_cut) {
+      const int wanted = halvings_for(moving_.flesh.time, options_.step);
+      if (wanted > moving_.counter.halvings ||
+          (wanted < moving_.counter.halvings && moving_.counter.since_change >= kStepsBetweenChanges)) {
+        moving_.counter.halvings = wanted;
+        moving_.counter.since_change = 0;
       }
     }
-    const int parts = in_cut ? 1 : 1 << halvings_;
+    const int parts = in_cut ? 1 : 1 << moving_.counter.halvings;
     const SimulationReport report = in_cut ? carry_through_cut() : step_once(options_.step / parts);
-    if (report.status == SimulationStatus::NoConvergence && halvings_ < kMostHalvings) {
-      ++halvings_;
-      part_ *= 2;
-      steps_since_change_ = 0;
+    if (report.status == SimulationStatus::NoConvergence && moving_.counter.halvings < kMostHalvings) {
+      ++moving_.counter.halvings;
+      moving_.counter.part *= 2;
+      moving_.counter.since_change = 0;
       // A jolt: the start without history damps it more than a step that looks back across it.
-      track_.clear();
+      moving_.track.clear();
       continue;
     }
     ++total.steps;
-    ++steps_since_change_;
+    ++moving_.counter.since_change;
     total.time = report.time;
     total.status = report.status;
     total.message = report.message;
     if (report.status != SimulationStatus::Ok) return total;
-    if (++part_ == parts) {
-      part_ = 0;
-      ++base_step_;
-      state_.time = now_.time = start_ + static_cast<double>(base_step_) * options_.step;
+    if (++moving_.counter.part == parts) {
+      moving_.counter.part = 0;
+      ++moving_.counter.whole;
+      moving_.flesh.time = moving_.now.time =
+          moving_.counter.start + static_cast<double>(moving_.counter.whole) * options_.step;
     }
     if (should_stop_ && should_stop_()) {
       total.status = SimulationStatus::Stopped;
@@ -495,19 +494,19 @@ SimulationReport Simulation::advance_to(double time) {
 }
 
 Points Simulation::positions_at(double time) const {
-  const double span = state_.time - before_.time;
-  const double theta = span > 0.0 ? std::clamp((time - before_.time) / span, 0.0, 1.0) : 1.0;
-  if (theta >= 1.0) return state_.x;
+  const double span = moving_.flesh.time - moving_.before.time;
+  const double theta = span > 0.0 ? std::clamp((time - moving_.before.time) / span, 0.0, 1.0) : 1.0;
+  if (theta >= 1.0) return moving_.flesh.x;
   const PosedFrames posed = pose_at(time);
   if (!info_->dynamic) return skinned_positions(body_, posed);
-  Points x = Points::Zero(state_.x.rows(), 3);
+  Points x = Points::Zero(moving_.flesh.x.rows(), 3);
   for (Eigen::Index a = 0; a < x.rows(); ++a) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (FrameWeights::InnerIterator it(body_.weights, a); it; ++it) {
       const auto f = static_cast<std::size_t>(it.col());
       const Eigen::Vector3d in_bone =
-          (1.0 - theta) * (past_.frames[f].to_rest * before_.x.row(a).transpose()) +
-          theta * (now_.frames[f].to_rest * state_.x.row(a).transpose());
+          (1.0 - theta) * (moving_.past.frames[f].to_rest * moving_.before.x.row(a).transpose()) +
+          theta * (moving_.now.frames[f].to_rest * moving_.flesh.x.row(a).transpose());
       sum += it.value() * (posed.frames[f].from_rest * in_bone);
     }
     x.row(a) = sum.transpose();
@@ -517,16 +516,16 @@ Points Simulation::positions_at(double time) const {
 }
 
 Points Simulation::velocities_at(double time) const {
-  const double span = state_.time - before_.time;
-  const double theta = span > 0.0 ? std::clamp((time - before_.time) / span, 0.0, 1.0) : 1.0;
-  return (1.0 - theta) * before_.v + theta * state_.v;
+  const double span = moving_.flesh.time - moving_.before.time;
+  const double theta = span > 0.0 ? std::clamp((time - moving_.before.time) / span, 0.0, 1.0) : 1.0;
+  return (1.0 - theta) * moving_.before.v + theta * moving_.flesh.v;
 }
 
 Measures Simulation::measures_at(double time) const {
-  const double span = state_.time - before_.time;
-  const bool at_end = !(span > 0.0) || time >= state_.time;
+  const double span = moving_.flesh.time - moving_.before.time;
+  const bool at_end = !(span > 0.0) || time >= moving_.flesh.time;
   const Points x = positions_at(time);
-  const PosedFrames pose = at_end ? now_ : pose_at(time);
+  const PosedFrames pose = at_end ? moving_.now : pose_at(time);
   Measures measures = measure(body_, x, velocities_at(time), pose, options_.gravity);
   if (!model_->linear_in_frames()) {
     measures.elastic = 0.0;

@@ -11,6 +11,7 @@
 #include "fem/time/cuts.h"
 #include "fem/time/energy_cap.h"
 #include "fem/time/motion.h"
+#include "fem/time/moving_state.h"
 #include "fem/time/track.h"
 
 /// The time loop: settles the flesh, steps it along a motion, and samples it at any time between steps. Knows
@@ -66,6 +67,9 @@ inline constexpr double kSettledRate = 5e-4;
 /// lengths in a second. Longer steps reach it at lower speeds; the envelope warns of it.
 inline constexpr double kCutJump = 1.0;
 
+/// A step is halved at most so often, for fast frames and for solves that fail.
+inline constexpr int kMostHalvings = 8;
+
 class Simulation {
  public:
   /// Starts at rest in the pose of `start_time`. `body` must outlive it. `should_stop` is asked after every
@@ -79,7 +83,7 @@ class Simulation {
   /// motion's velocity, so that nothing jolts at the first frame.
   [[nodiscard]] SimulationReport settle();
 
-  /// Steps, or sub-steps where a frame turns fast or the model's solve fails, until state().time >= time;
+  /// Steps, or sub-steps where a frame turns fast or the model's solve fails, until flesh().time >= time;
   /// does nothing when it is there already. In a cut, and where a frame jumps by more than kCutJump, the
   /// flesh is carried along with the frames and keeps its velocity: that gives it no push. Throws
   /// std::invalid_argument
@@ -98,7 +102,13 @@ class Simulation {
   void set_step(double step);
 
   const Body& body() const { return body_; }
-  const State& state() const { return state_; }
+  const State& flesh() const { return moving_.flesh; }
+  /// All that moves, between two calls.
+  MovingState state() const;
+  /// Goes on from a state of a run with this body and motion and these options, of this simulation or another
+  /// one: bit for bit as that run did. Steps take the state's length. Throws std::invalid_argument naming the
+  /// part that does not fit the body, and then leaves all as it was.
+  void set_state(MovingState state);
   /// Leaf vertices at a time between the last two states, moved in bone coordinates; bone vertices exactly on
   /// the clip.
   lattice::Points positions_at(double time) const;
@@ -142,7 +152,7 @@ class Simulation {
   SolveReport tr_bdf2_step(double h, const PosedFrames& next, State& after);
   StageProblem stage(const State& from, const lattice::Points& x_h, const lattice::Points& v_h,
                      const StagePoses& poses, double elapsed, double h, double time);
-  const PosedFrames* before_pose() const { return has_before_ ? &past_ : nullptr; }
+  const PosedFrames* before_pose() const { return moving_.has_before ? &moving_.past : nullptr; }
   SimulationReport failed(const SolveReport& solve) const;
   bool check(SimulationReport& report) const;
 
@@ -156,28 +166,10 @@ class Simulation {
   lattice::Points force_;  ///< of loads and options_.force, in the stage under way.
   /// While the flesh settles: what the frames' acceleration takes from its weight [N]; else empty.
   lattice::Points inertial_force_;
-  double start_ = 0.0;
-  State state_, before_;     ///< now and one step earlier, for sampling.
-  PosedFrames now_, past_;   ///< their poses.
-  bool has_before_ = false;  ///< past_ is one real step earlier.
-  double last_h_ = 0.0;
-  Track track_;  ///< of BDF2.
+  /// Without what the energy cap and the model remember, which they keep themselves.
+  MovingState moving_;
   std::optional<EnergyCap> energy_cap_;
-  double longest_ = 0.0;  ///< whole step so far [s].
-  /// Where TR-BDF2 broke its last step.
-  struct StepEnd {
-    lattice::Points x_middle;  ///< num_vertices x 3 [m].
-    PosedFrames middle;
-    double h = 0.0;  ///< [s].
-  };
-  std::optional<StepEnd> step_end_;  ///< empty before the first step.
-  /// During a cut: the flesh's velocity relative to its frames [m/s].
-  std::optional<lattice::Points> relative_velocity_;
   std::optional<PosedFrames> held_;  ///< during a step after a cut: the pose that stands still.
-  long base_step_ = 0;               ///< whole steps taken: time is start + n h, never a running sum.
-  int part_ = 0;  ///< sub-steps taken of the step under way: a frame may be sampled between two of them.
-  int halvings_ = 0;
-  int steps_since_change_ = 0;
 };
 
 }  // namespace sinew::fem

@@ -10,6 +10,11 @@ namespace sinew::fem {
 /// Where flesh has been: what a step of another length than the last one asks for.
 class Track {
  public:
+  struct Passed {
+    double time = 0.0;        ///< [s].
+    lattice::Points x, v, a;  ///< num_vertices x 3 [m], [m/s], [m/s^2]; a empty where it is not known.
+  };
+
   void clear() { passed_.clear(); }
   std::size_t size() const { return passed_.size(); }
 
@@ -21,12 +26,12 @@ class Track {
   /// two that have their velocities and accelerations. Nothing where the track does not reach back that far.
   std::optional<State> looking_back(const State& now, double span) const;
 
+  /// Latest first.
+  const std::vector<Passed>& passed() const { return passed_; }
+  std::vector<Passed>& passed() { return passed_; }
+
  private:
-  struct Passed {
-    double time = 0.0;        ///< [s].
-    lattice::Points x, v, a;  ///< num_vertices x 3 [m], [m/s], [m/s^2]; a empty where it is not known.
-  };
-  std::vector<Passed> passed_;  ///< latest first.
+  std::vector<Passed> passed_;
 };
 
 }  // namespace sinew::fem

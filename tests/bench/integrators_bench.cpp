@@ -85,7 +85,7 @@ double whip(Integrator integrator) {
   double first = 0.0, last = 0.0;
   for (int step = 1; step <= 180; ++step) {
     if (simulation.advance_to(step / 120.0).status != fem::SimulationStatus::Ok) return std::nan("");
-    const double bend = std::abs(simulation.state().x(tip, 2));
+    const double bend = std::abs(simulation.flesh().x(tip, 2));
     if (step <= 30) first = std::max(first, bend);
     if (step > 150) last = std::max(last, bend);
   }
@@ -111,7 +111,7 @@ double spin(Integrator integrator) {
   };
   const double before = momentum(body.mesh.points, v);
   if (simulation.advance_to(1.0).status != fem::SimulationStatus::Ok) return std::nan("");
-  return momentum(simulation.state().x, simulation.state().v) / before;
+  return momentum(simulation.flesh().x, simulation.flesh().v) / before;
 }
 
 /// Processor time of a step at 1/120 s [ms].

@@ -41,7 +41,7 @@ Run run(const fem::Body& body, const std::string& model, int frames) {
     const fem::SimulationReport report = simulation.advance_to(step / 120.0);
     times.push_back(milliseconds() - start);
     if (report.status != fem::SimulationStatus::Ok) result.failure = report.message;
-    if (step % 2 == 0) result.tip.emplace_back(simulation.state().x.row(tip));
+    if (step % 2 == 0) result.tip.emplace_back(simulation.flesh().x.row(tip));
   }
   std::sort(times.begin(), times.end());
   result.median_ms = times[times.size() / 2];

@@ -83,7 +83,7 @@ void Factorise(benchmark::State& state) {
 
 void Embed(benchmark::State& state) {
   const auto simulation = setup().simulation(setup().body, fem::Precision::Double);
-  for (auto _ : state) benchmark::DoNotOptimize(simulation.skin_of(simulation.state().x).sum());
+  for (auto _ : state) benchmark::DoNotOptimize(simulation.skin_of(simulation.flesh().x).sum());
 }
 
 /// Steps of 1/120 s through the clip, there and back; real_time_ratio below 1 is faster than the clip plays.

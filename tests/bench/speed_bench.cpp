@@ -65,7 +65,7 @@ Swing swing_once(const fem::Body& bar, Integrator integrator, int steps_per_fram
     const double ms = processor_time() - start;
     result.mean_ms += ms / kFrames;
     result.worst_ms = std::max(result.worst_ms, ms);
-    result.tip.emplace_back(simulation.state().x.row(tip));
+    result.tip.emplace_back(simulation.flesh().x.row(tip));
   }
   return result;
 }
@@ -143,11 +143,11 @@ Steps take_steps_once(const fem::Body& body, const fem::Motion& motion, const St
     const double start = wall_time();
     demand(simulation.advance_to((step + 0.5) / 120.0));
     if (step >= 3) times.push_back(wall_time() - start);
-    result.skin.push_back(simulation.skin_of(simulation.state().x));
+    result.skin.push_back(simulation.skin_of(simulation.flesh().x));
   }
   std::sort(times.begin(), times.end());
   result.median_ms = times[times.size() / 2];
-  result.x = simulation.state().x;
+  result.x = simulation.flesh().x;
   result.counts = simulation.counts();
   return result;
 }

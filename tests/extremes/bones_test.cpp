@@ -144,7 +144,7 @@ TEST(Extremes, X15BonesThatShakeAtResonance) {
     const auto look = [&](const Simulation& simulation) {
       double& most = amplitude[static_cast<std::size_t>(step++ / per_period)];
       most = std::max(
-          most, std::abs(simulation.state().x(tip, 2) - motion(simulation.state().time)[0].translation()[2]));
+          most, std::abs(simulation.flesh().x(tip, 2) - motion(simulation.flesh().time)[0].translation()[2]));
     };
     const SimulationOptions options =
         extreme_options(rung, period / per_period, kNoWeight, Integrator::TrBdf2);

@@ -145,16 +145,16 @@ Extreme run_extreme(Simulation& simulation, double step, int steps, double held_
   for (const fem::Material& material : body.materials)
     stiffness += material.young * body.volume / static_cast<double>(body.materials.size());
   const std::clock_t start = std::clock();
-  const double begin = simulation.state().time;
+  const double begin = simulation.flesh().time;
   HeldEnergy held;
   if (begin >= held_from) held.let_go(simulation.measures_at(begin));
   for (int k = 1; k <= steps; ++k) {
     // To the end of the k-th step, whatever its parts, and not by rounding to the next one's.
     const fem::SimulationReport report = simulation.advance_to(begin + (k - 1e-3) * step);
     result.steps += report.steps;
-    result.x = simulation.state().x;
-    result.v = simulation.state().v;
-    result.time = simulation.state().time;
+    result.x = simulation.flesh().x;
+    result.v = simulation.flesh().v;
+    result.time = simulation.flesh().time;
     if (report.status != fem::SimulationStatus::Ok) {
       result.failure = report.message.empty() ? "(no name)" : report.message;
       EXPECT_FALSE(report.message.empty());

@@ -231,7 +231,7 @@ TEST(Extremes, X7DampingFromNoneToAThousandTimesCritical) {
       const double rest = rest_of(body, rung, kWeight)(tip, 2);
       double before = 0.0, back = 0.0;
       const auto look = [&](const Simulation& simulation) {
-        const double z = simulation.state().x(tip, 2);
+        const double z = simulation.flesh().x(tip, 2);
         back = std::max(back, (z - before) / -rest);
         before = z;
       };
@@ -273,9 +273,9 @@ TEST(Extremes, X7LogarithmicDecrement) {
       // Amplitude of the mode: its displacement and velocity make one circle.
       std::vector<double> amplitude;
       const auto look = [&](const Simulation& simulation) {
-        const Points u = simulation.state().x - body.mesh.points;
+        const Points u = simulation.flesh().x - body.mesh.points;
         const double q = shape.cwiseProduct(u).sum() / mass,
-                     v = shape.cwiseProduct(simulation.state().v).sum() / mass + zeta * w * q;
+                     v = shape.cwiseProduct(simulation.flesh().v).sum() / mass + zeta * w * q;
         amplitude.push_back(std::hypot(q, v / (w * std::sqrt(1.0 - zeta * zeta))));
       };
       const SimulationOptions options =
@@ -305,7 +305,7 @@ TEST(Extremes, X7UndampedFleshKeepsItsEnergyUnderTheMidpointRule) {
     for (const std::string& rung : dynamic_rungs()) {
       std::vector<double> energy;
       const auto look = [&](const Simulation& simulation) {
-        const fem::Measures m = simulation.measures_at(simulation.state().time);
+        const fem::Measures m = simulation.measures_at(simulation.flesh().time);
         energy.push_back(m.kinetic + m.elastic);
       };
       const double step = 2.0 * M_PI / w / 40.0;

@@ -76,11 +76,11 @@ TEST(Momentum, OfAFreeBodyGrowsByItsWeightAlone) {
       options.gravity = {0.0, -9.81, 2.0};
       Simulation simulation(body, still, 0.0, options);
       simulation.set_velocity(lively(body, 1.0));
-      const Momenta before = momenta(body, simulation.state());
+      const Momenta before = momenta(body, simulation.flesh());
       ASSERT_EQ(simulation.advance_to(0.249).status, SimulationStatus::Ok) << info.name;
-      const double weight = 1000.0 * body.volume * simulation.state().time;
+      const double weight = 1000.0 * body.volume * simulation.flesh().time;
       const Eigen::RowVector3d expected = before.linear + weight * options.gravity.transpose();
-      const double error = (momenta(body, simulation.state()).linear - expected).norm() / expected.norm();
+      const double error = (momenta(body, simulation.flesh()).linear - expected).norm() / expected.norm();
       errors.add(error);
       EXPECT_LE(error, 3e-8) << info.name << " " << static_cast<int>(integrator);
     }
@@ -96,9 +96,9 @@ TEST(AngularMomentum, IsKeptByTheMidpointRuleAndLostByTheOthers) {
     for (Integrator integrator : kIntegrators) {
       Simulation simulation(body, still, 0.0, options_of(model, integrator, 1.0 / 60.0));
       simulation.set_velocity(lively(body, 6.0));
-      const Eigen::Vector3d before = momenta(body, simulation.state()).angular;
+      const Eigen::Vector3d before = momenta(body, simulation.flesh()).angular;
       ASSERT_EQ(simulation.advance_to(0.49).status, SimulationStatus::Ok) << model;
-      const Eigen::Vector3d after = momenta(body, simulation.state()).angular;
+      const Eigen::Vector3d after = momenta(body, simulation.flesh()).angular;
       const double lost = 1.0 - after.norm() / before.norm();
       if (integrator == Integrator::ImplicitMidpoint) {
         EXPECT_LE((after - before).norm(), 1e-6 * before.norm()) << model;
@@ -131,7 +131,7 @@ TEST(FreeSpin, IsLostByBackwardEulerAsTheClosedFormSaysAndKeptByTheOthers) {
       Simulation simulation(body, still, 0.0, options_of(model, integrator, h));
       simulation.set_velocity(v);
       EXPECT_EQ(simulation.advance_to(1.0 - 1e-6).status, SimulationStatus::Ok);
-      const Points& x = simulation.state().x;
+      const Points& x = simulation.flesh().x;
       const Eigen::RowVector3d along =
           x.row(tests::vertex_at(body, {0.4, 0, 0})) - x.row(tests::vertex_at(body, {0, 0, 0}));
       return std::remainder(std::atan2(along[1], along[0]) - expected, 2.0 * M_PI);
@@ -173,10 +173,10 @@ std::vector<Sample> samples(const Linear& linear, Integrator integrator, double 
   options.gravity = {0.0, 0.0, -9.81};
   Simulation simulation(linear.body, still, 0.0, options);
   simulation.set_velocity(0.3 * lively(linear.body, 1.0));
-  std::vector<Sample> all{{simulation.state().x - linear.rest, simulation.state().v}};
+  std::vector<Sample> all{{simulation.flesh().x - linear.rest, simulation.flesh().v}};
   for (int n = 0; n < steps; ++n) {
     EXPECT_EQ(simulation.advance_to((n + 0.5) * h).status, SimulationStatus::Ok);
-    all.push_back({simulation.state().x - linear.rest, simulation.state().v});
+    all.push_back({simulation.flesh().x - linear.rest, simulation.flesh().v});
   }
   return all;
 }

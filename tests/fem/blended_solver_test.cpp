@@ -26,7 +26,7 @@ Points swung(const Body& body, const SolverOptions& solver) {
   options.solver = solver;
   Simulation simulation(body, motion, 0.0, options);
   EXPECT_EQ(simulation.advance_to(0.5).status, SimulationStatus::Ok);
-  return simulation.state().x;
+  return simulation.flesh().x;
 }
 
 double largest_distance(const Points& a, const Points& b) { return (a - b).rowwise().norm().maxCoeff(); }
@@ -86,7 +86,7 @@ TEST(BlendedSolver, InShortStaysCloseToDoubleAndComesToTheSameRest) {
     std::vector<Points> at;
     for (double time : {0.5, 10.0}) {
       EXPECT_EQ(simulation.advance_to(time).status, SimulationStatus::Ok);
-      at.push_back(simulation.state().x);
+      at.push_back(simulation.flesh().x);
     }
     return at;
   };
@@ -128,7 +128,7 @@ TEST(BlendedSolver, DoesNothingToFleshAtRest) {
     Simulation simulation(body, rest, 0.0, options);
     ASSERT_EQ(simulation.advance_to(0.5).status, SimulationStatus::Ok);
     // Rounding of forces K u with u = eps, over 60 damped steps.
-    EXPECT_LE(largest_distance(simulation.state().x, body.mesh.points), 1e-14);
+    EXPECT_LE(largest_distance(simulation.flesh().x, body.mesh.points), 1e-14);
   }
 }
 
@@ -151,7 +151,7 @@ TEST(BlendedSolver, FollowsATwistOfTheForearm) {
         body, [&](double time) { return twist(M_PI / 2 * tests::smooth_step(time)); }, 0.0, run);
     EXPECT_EQ(simulation.advance_to(2.0).status, SimulationStatus::Ok);
     // The mean turn of the skin vertices at x = 0.75.
-    const Points skin = simulation.skin_of(simulation.state().x);
+    const Points skin = simulation.skin_of(simulation.flesh().x);
     double sum = 0.0;
     int count = 0;
     for (Eigen::Index k = 0; k < skin.rows(); ++k) {

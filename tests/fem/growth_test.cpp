@@ -46,8 +46,8 @@ SimulationReport held(const Body& body, const std::vector<Eigen::Affine3d>& pose
   Simulation simulation(
       body, [&](double) { return pose; }, 0.0, options);
   const SimulationReport report = simulation.advance_to(seconds);
-  x = simulation.state().x;
-  measures = simulation.measures_at(simulation.state().time);
+  x = simulation.flesh().x;
+  measures = simulation.measures_at(simulation.flesh().time);
   return report;
 }
 

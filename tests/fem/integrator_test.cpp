@@ -175,11 +175,11 @@ Points run_by_turns(const Body& body, const Motion& motion, Integrator integrato
   for (int pair = 0; pair < rate / 5 * 4; ++pair) {
     for (const double part : {1.0, 0.25}) {
       simulation.set_step(part / rate);
-      EXPECT_EQ(simulation.advance_to(simulation.state().time + 0.5 * part / rate).steps, 1);
+      EXPECT_EQ(simulation.advance_to(simulation.flesh().time + 0.5 * part / rate).steps, 1);
     }
   }
-  EXPECT_NEAR(simulation.state().time, kTime, 1e-12);
-  return simulation.state().x;
+  EXPECT_NEAR(simulation.flesh().time, kTime, 1e-12);
+  return simulation.flesh().x;
 }
 
 // With a start anew after every change BDF2 is a method of order 0.9 here, and with velocities between two
@@ -257,8 +257,8 @@ TEST(Integrators, DampAFreeSwingAsTheirClosedFormSays) {
     const SimulationOptions options = options_of(1.0 / 120, integrator, kGravity);
     Simulation simulation(body, still, 0.0, options);
     ASSERT_EQ(simulation.advance_to(5.0 / 4.0).status, SimulationStatus::Ok);
-    const Eigen::Vector2d q = in_lowest_modes(simulation.state().x - body.mesh.points) - rest;
-    const Eigen::Vector2d v = in_lowest_modes(simulation.state().v) / w;
+    const Eigen::Vector2d q = in_lowest_modes(simulation.flesh().x - body.mesh.points) - rest;
+    const Eigen::Vector2d v = in_lowest_modes(simulation.flesh().v) / w;
     const double left = std::sqrt(q.squaredNorm() + v.squaredNorm()) / rest.norm();
     // The start step differs from the others: O(w h)^2 = 4 % of a step's effect.
     EXPECT_NEAR(left, std::pow(amplification(integrator, w / 120.0), 150), 0.02);
@@ -274,7 +274,7 @@ TEST(ImplicitMidpoint, KeepsTheEnergyOfALinearBody) {
     double largest = 0.0, exchanged = 0.0;
     for (int n = 0; n < 200; ++n) {
       EXPECT_EQ(simulation.advance_to((n + 0.5) / 30).status, SimulationStatus::Ok);
-      const Measures m = simulation.measures_at(simulation.state().time);
+      const Measures m = simulation.measures_at(simulation.flesh().time);
       largest = std::max(largest, std::abs(m.kinetic + m.elastic + m.potential));  // 0 at the start
       exchanged = std::max(exchanged, m.elastic);
     }

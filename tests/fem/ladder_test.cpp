@@ -221,7 +221,7 @@ TEST(Ladder, HalvesAStepThatFailsAndRecovers) {
   Simulation simulation(body, motion, 0.0, options);
   const SimulationReport report = simulation.advance_to(0.3);
   EXPECT_EQ(report.status, SimulationStatus::Ok) << report.message;
-  EXPECT_TRUE(simulation.state().x.allFinite());
+  EXPECT_TRUE(simulation.flesh().x.allFinite());
   EXPECT_EQ(simulation.measures_at(0.3).inverted_cells, 0);
 }
 

@@ -109,10 +109,10 @@ Error error_of(const ChosenMotion& motion, Integrator integrator, int blocks, do
   simulation.set_velocity(v);
   const SimulationReport report = simulation.advance_to(kTime - 1e-9);  // whole steps
   EXPECT_EQ(report.status, SimulationStatus::Ok) << report.message;
-  EXPECT_NEAR(simulation.state().time, kTime, 1e-9);
+  EXPECT_NEAR(simulation.flesh().time, kTime, 1e-9);
 
   const double a = std::sin(kTurn * kTime);
-  const Points u = simulation.state().x - body.mesh.points;
+  const Points u = simulation.flesh().x - body.mesh.points;
   Error error;
   each_gauss_point(body, [&](const lattice::HexVertices& cell, double weight, const lattice::HexWeights& phi,
                              const Eigen::Vector3d& at) {
@@ -205,7 +205,7 @@ double time_error(const Body& body, const std::string& model, Integrator integra
   simulation.set_velocity(kRate * shape);
   const SimulationReport report = simulation.advance_to(kTime - 1e-9);
   EXPECT_EQ(report.status, SimulationStatus::Ok) << model << ": " << report.message;
-  const Points error = simulation.state().x - body.mesh.points - std::sin(kRate * kTime) * shape;
+  const Points error = simulation.flesh().x - body.mesh.points - std::sin(kRate * kTime) * shape;
   return std::sqrt(error.squaredNorm() / static_cast<double>(error.rows()));
 }
 

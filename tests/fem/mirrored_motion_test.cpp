@@ -96,7 +96,7 @@ double asymmetry(const Rig& rig, const lattice::ControlLattice& lattice) {
   EXPECT_EQ(simulation.settle().status, SimulationStatus::Ok);
   EXPECT_EQ(simulation.advance_to(0.25).status, SimulationStatus::Ok);
   const lattice::Points& rest = rig.skin.points;
-  const lattice::Points skin = simulation.skin_of(simulation.state().x);
+  const lattice::Points skin = simulation.skin_of(simulation.flesh().x);
   double largest = 0.0, motion = 0.0;
   for (Eigen::Index v = 0; v < skin.rows(); ++v) {
     const Eigen::RowVector3d image(-rest(v, 0), rest(v, 1), rest(v, 2));

@@ -85,7 +85,7 @@ TEST(Models, FeelABodyLoadAsTheyFeelGravity) {
       Simulation simulation(
           body, [](double) { return tests::arm_pose(30.0 * kDegree); }, 0.0, options);
       EXPECT_EQ(simulation.advance_to(0.1).status, SimulationStatus::Ok) << model.name;
-      return simulation.state().x;
+      return simulation.flesh().x;
     };
     const Points weight = positions(false), load = positions(true);
     EXPECT_GT((weight - skinned_positions(body, pose_frames(body.tree, tests::arm_pose(30.0 * kDegree), 0.0)))
@@ -110,7 +110,7 @@ TEST(Models, StartWithTheVelocityGiven) {
   v.col(1).setConstant(0.2);
   simulation.set_velocity(v);
   for (const BoneVertex& bone : body.bones.vertices)
-    EXPECT_EQ(simulation.state().v.row(bone.vertex).norm(), 0.0);
+    EXPECT_EQ(simulation.flesh().v.row(bone.vertex).norm(), 0.0);
   EXPECT_NEAR(simulation.measures_at(0.0).largest_speed, 0.2, 1e-15);
 }
 
@@ -249,7 +249,7 @@ State tumbled(const Body& body, double h, double time) {
       body, [](double) { return std::vector<Eigen::Affine3d>{Eigen::Affine3d::Identity()}; }, 0.0, options);
   simulation.set_velocity(v);
   EXPECT_EQ(simulation.advance_to(time - 0.25 * h).status, SimulationStatus::Ok);
-  return simulation.state();
+  return simulation.flesh();
 }
 
 // The conjugate gradients stop at a thousandth of (w0 h)^2 of the forces they start from, w0 the frequency of

@@ -66,7 +66,7 @@ TEST_P(Settling, StartsWeightlessInFreeFall) {
     ASSERT_EQ(report.status, SimulationStatus::Ok);
     EXPECT_TRUE(report.settled);
     // 0.3 % of the length is asked; settled is what moves by less than 0.05 % of it in a second.
-    EXPECT_LT(largest_distance(simulation.state().x, body_.mesh.points), 3e-4 * kLength) << fps;
+    EXPECT_LT(largest_distance(simulation.flesh().x, body_.mesh.points), 3e-4 * kLength) << fps;
     double largest = 0.0;
     for (int frame = 1; frame <= 30; ++frame) {
       const double time = frame / 30.0;
@@ -88,7 +88,7 @@ TEST_P(Settling, StandsUnderCentrifugalForces) {
   };
   Simulation simulation(body_, motion, 0.0, options());
   ASSERT_EQ(simulation.settle().status, SimulationStatus::Ok);
-  const Points start = seen_from(motion(0.0)[0], simulation.state().x);
+  const Points start = seen_from(motion(0.0)[0], simulation.flesh().x);
   double largest = 0.0;
   for (int frame = 1; frame <= 30; ++frame) {
     const double time = frame / 30.0;
@@ -99,7 +99,7 @@ TEST_P(Settling, StandsUnderCentrifugalForces) {
   Simulation still(
       body_, [&](double) { return motion(0.0); }, 0.0, options());
   ASSERT_EQ(still.settle().status, SimulationStatus::Ok);
-  const double pulled = largest_distance(seen_from(motion(0.0)[0], still.state().x), start);
+  const double pulled = largest_distance(seen_from(motion(0.0)[0], still.flesh().x), start);
   // The forces move the flesh by `pulled`, 14 mm; flesh that started without them would swing through twice
   // that. Measured 3 mm, at 3 degrees a step.
   EXPECT_GT(pulled, 0.01);
@@ -111,7 +111,7 @@ TEST_P(Settling, TakesNothingForAnAccelerationThatDoesNotLast) {
   const auto start = [&](const Motion& motion) {
     Simulation simulation(body_, motion, 0.0, options(30.0));
     EXPECT_EQ(simulation.settle().status, SimulationStatus::Ok);
-    return simulation.state();
+    return simulation.flesh();
   };
   const State held = start(moved([](double) { return Eigen::Vector3d::Zero(); }, 1.0));
   const State off = start(keyed(
@@ -161,7 +161,7 @@ TEST(LinearFlesh, SettlesInAStep) {
   EXPECT_TRUE(report.settled);
   EXPECT_EQ(report.steps, 1);
   EXPECT_GT(largest_distance(
-                simulation.state().x,
+                simulation.flesh().x,
                 skinned_positions(body, pose_frames(body.tree, tests::arm_pose(120.0 * kDegree), 0.0))),
             0.01);
 }

@@ -108,7 +108,7 @@ TEST(Simulation, ConstantVelocityLeavesNoDeformation) {
         const Points rigid = body.mesh.points.rowwise() + move(2.0)[0].translation().transpose();
         // Rounding of positions, eps times the distance from the origin, over 240 damped steps; the issue
         // asks for 1e-9 (measured 9e-15 and 8e-13).
-        EXPECT_LE(largest_distance(simulation.state().x, rigid), far > 0.0 ? 1e-11 : 1e-13) << margin;
+        EXPECT_LE(largest_distance(simulation.flesh().x, rigid), far > 0.0 ? 1e-11 : 1e-13) << margin;
       }
     }
   }
@@ -130,7 +130,7 @@ TEST(Simulation, ConstantVelocityKeepsTheShapeOfABentArm) {
       Simulation simulation(body, move, 0.0, options);
       EXPECT_EQ(simulation.settle().status, SimulationStatus::Ok);
       EXPECT_EQ(simulation.advance_to(1.0).status, SimulationStatus::Ok);
-      return simulation.state().x.rowwise() - velocity.transpose();
+      return simulation.flesh().x.rowwise() - velocity.transpose();
     };
     // Both come to rest in the same place; what settling leaves is 1e-9 m/s for a fraction of a second.
     EXPECT_LE(largest_distance(shape(Eigen::Vector3d::Zero()), shape({5.0, -2.0, 1.0})), 1e-9);
@@ -147,10 +147,10 @@ TEST(Simulation, AHeldElbowIsAFixedPoint) {
       Simulation simulation(body, held(degrees), 0.0, options);
       const SimulationReport settled = simulation.settle();
       ASSERT_LT(settled.speed, 1e-8);
-      const Points x = simulation.state().x;
+      const Points x = simulation.flesh().x;
       ASSERT_EQ(simulation.advance_to(1.0).status, SimulationStatus::Ok);
       // Flesh that creeps at 1e-8 m/s and slows down within 0.1 s goes no farther than this.
-      EXPECT_LE(largest_distance(simulation.state().x, x), 1e-9) << degrees;
+      EXPECT_LE(largest_distance(simulation.flesh().x, x), 1e-9) << degrees;
       EXPECT_LE(simulation.measures_at(1.0).largest_speed, 1e-8) << degrees;
     }
   }
@@ -198,7 +198,7 @@ TEST(Simulation, TheHeldPoseDependsOnTheStepAsPublished) {
       options.settle_speed = 1e-5;
       Simulation simulation(body, held(degrees), 0.0, options);
       EXPECT_EQ(simulation.settle().status, SimulationStatus::Ok);
-      return simulation.state().x;
+      return simulation.flesh().x;
     };
     return 100.0 * rms(pose(1.0 / 120), pose(1.0 / 480));
   };
@@ -233,8 +233,8 @@ TEST(Simulation, SeveralRegionsSwingAsOneWhereTheirFramesAgree) {
       const double time = step / 480.0;
       EXPECT_EQ(single.advance_to(time).status, SimulationStatus::Ok);
       EXPECT_EQ(blended.advance_to(time).status, SimulationStatus::Ok);
-      largest = std::max(largest, largest_distance(single.state().x, blended.state().x));
-      swing = std::max(swing, largest_distance(single.state().x, one.mesh.points));
+      largest = std::max(largest, largest_distance(single.flesh().x, blended.flesh().x));
+      swing = std::max(swing, largest_distance(single.flesh().x, one.mesh.points));
     }
     return largest / swing;
   };
@@ -295,7 +295,7 @@ TEST(Simulation, GivesTheSameBitsForAnyNumberOfThreads) {
     Simulation simulation(body, restless, 0.0, options_of(Integrator::Bdf2));
     EXPECT_EQ(simulation.settle().status, SimulationStatus::Ok);
     EXPECT_EQ(simulation.advance_to(0.25).status, SimulationStatus::Ok);
-    const State& state = simulation.state();
+    const State& state = simulation.flesh();
     Points all(4 * state.x.rows(), 3);
     all << state.x, state.v, state.x_past, simulation.positions_at(0.2487);
     return all;
@@ -331,8 +331,8 @@ TEST(Simulation, NamesTheJointAndTheTimeOfABadPose) {
     // The step from 0.1 s looks at quarters of itself first.
     EXPECT_EQ(thrown_by(simulation, 0.2),
               "joint 'elbow': its transform at 0.102083 s is not finite or has no volume");
-    EXPECT_NEAR(simulation.state().time, 0.1, 1e-12);
-    EXPECT_TRUE(simulation.state().x.allFinite());
+    EXPECT_NEAR(simulation.flesh().time, 0.1, 1e-12);
+    EXPECT_TRUE(simulation.flesh().x.allFinite());
   }
 }
 
@@ -361,7 +361,7 @@ TEST(Simulation, StopsWithinAStepWhenAsked) {
   const SimulationReport report = simulation.advance_to(1.0);
   EXPECT_EQ(report.status, SimulationStatus::Stopped);
   EXPECT_EQ(report.steps, 3);
-  EXPECT_NEAR(simulation.state().time, 3.0 / 120.0, 1e-12);
+  EXPECT_NEAR(simulation.flesh().time, 3.0 / 120.0, 1e-12);
 }
 
 TEST(SimulationOptions, NameTheFieldAtFault) {

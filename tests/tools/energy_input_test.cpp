@@ -68,12 +68,12 @@ TEST_P(EnergyInput, IsAllThatTheFleshHas) {
     return fem::StoredEnergy(body, fem::pose_frames(body.tree, character.pose(time), 0.0), options.gravity);
   };
   double put_in = 0.0, most_kinetic = 0.0, most_gained = 0.0;
-  fem::State before = simulation.state();
+  fem::State before = simulation.flesh();
   fem::StoredEnergy stored = stored_at(before.time);
   const double at_first = fem::kinetic_energy(body, before.v) + stored.of(before.x);
-  while (simulation.state().time < begin + 0.25) {
+  while (simulation.flesh().time < begin + 0.25) {
     ASSERT_EQ(simulation.advance_to(before.time + 0.5 * options.step).status, fem::SimulationStatus::Ok);
-    const fem::State& after = simulation.state();
+    const fem::State& after = simulation.flesh();
     const fem::StoredEnergy next = stored_at(after.time);
     const Points middle = 0.5 * (before.x + after.x);
     put_in += next.of(put_together(body, middle, after.x)) - stored.of(put_together(body, middle, before.x));

@@ -101,7 +101,7 @@ TEST(Swing, HasTheLogarithmicDecrementOfItsDamping) {
   const double h = bar.scene.step;
   for (int n = 1; n <= 660; ++n) {
     ASSERT_EQ(simulation.advance_to((n - 0.5) * h).status, fem::SimulationStatus::Ok);
-    z = {z[1], z[2], simulation.state().x(tip, 2)};
+    z = {z[1], z[2], simulation.flesh().x(tip, 2)};
     const double before = z[1] - z[0], after = z[2] - z[1];
     if (n < 3 || before * after > 0.0) continue;
     // The parabola through three states.

@@ -109,9 +109,9 @@ RungCost try_rung(const Scene& scene, const Level& level, double time) {
   }
   cost.per_step = stepping.seconds() / std::max(1, steps);
   const Stopwatch frame;
-  const lattice::Points skin = simulation.skin_of(simulation.positions_at(simulation.state().time));
+  const lattice::Points skin = simulation.skin_of(simulation.positions_at(simulation.flesh().time));
   assets::skin(level.character.rig, level.character.pose(time));
-  if (skin.rows() > 0) simulation.measures_at(simulation.state().time);
+  if (skin.rows() > 0) simulation.measures_at(simulation.flesh().time);
   cost.per_frame = frame.seconds();
   return cost;
 }

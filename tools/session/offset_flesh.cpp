@@ -12,10 +12,10 @@ OffsetFlesh::OffsetFlesh(double share, const Character& character, const fem::Si
       character_(character),
       simulation_(simulation),
       rest_(simulation.body(), options,
-            fem::pose_frames(simulation.body().tree, character.pose(simulation.state().time),
-                             simulation.state().time),
-            simulation.state().x),
-      last_(simulation.state().time - options.step) {}
+            fem::pose_frames(simulation.body().tree, character.pose(simulation.flesh().time),
+                             simulation.flesh().time),
+            simulation.flesh().x),
+      last_(simulation.flesh().time - options.step) {}
 
 void OffsetFlesh::apply(double time, const std::vector<Eigen::Affine3d>& pose, const lattice::Points& skinned,
                         lattice::Points& simulated) {

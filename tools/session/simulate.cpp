@@ -384,7 +384,7 @@ void simulate(const Scene& scene, const Talk& talk) {
   lap("factor and settle");
   if (settled.status != fem::SimulationStatus::Ok) fail(character, settled, "settling");
   if (scene.plain && scene.plain->velocity)
-    simulation.set_velocity(starting_velocity(*scene.plain, simulation.state().x));
+    simulation.set_velocity(starting_velocity(*scene.plain, simulation.flesh().x));
   report.settle_steps = settled.steps;
   report.settle_speed = settled.speed;
   report.settle_joint = settled.fastest;

@@ -51,8 +51,7 @@ class RememberedRotations {
 struct EarlierFactor {
   explicit EarlierFactor(Precision precision) : factor(precision) {}
   RepeatedFactor factor;
-  double inertia = -1.0, damping = -1.0;
-  Rotations rotations;
+  ModelMemory::EarlierSystem of;
 };
 
 /// When conjugate gradients have done enough.
@@ -106,6 +105,9 @@ class RotatedModel final : public Model, public NearRest {
     return cells_.forces(x, rotations_(x, pose), body_.grows ? growth(body_, pose).shape : body_.mesh.points);
   }
 
+  ModelMemory memory() const override { return {{stage_factor_.of, rest_factor_.of}}; }
+  SolveReport recall(const ModelMemory& memory) override;
+
   SolverCounts counts() const override {
     SolverCounts counts;
     counts.regions = 1;
@@ -134,8 +136,7 @@ class RotatedModel final : public Model, public NearRest {
   Points apply(const Balance& balance, const Rotations& rotations, const Points& dx);
   SolveReport correct(const Balance& balance, const Rotations& rotations, const Points& residual,
                       const Enough& enough, Points& move);
-  bool refactor(const Balance& balance, const Rotations& rotations, EarlierFactor& earlier,
-                SolveReport& report);
+  bool refactor(const ModelMemory::EarlierSystem& system, EarlierFactor& earlier, SolveReport& report);
   std::vector<Eigen::Matrix3d> turns_since(const EarlierFactor& earlier, const Rotations& rotations) const;
 
   std::string name_;
@@ -215,23 +216,35 @@ Points RotatedModel::apply(const Balance& balance, const Rotations& rotations, c
   return free_.gather(forces);
 }
 
-bool RotatedModel::refactor(const Balance& balance, const Rotations& rotations, EarlierFactor& earlier,
+bool RotatedModel::refactor(const ModelMemory::EarlierSystem& system, EarlierFactor& earlier,
                             SolveReport& report) {
-  std::vector<CellStiffness> matrices(rotations.size());
+  std::vector<CellStiffness> matrices(system.rotations.size());
   tbb::parallel_for(std::size_t{0}, matrices.size(), [&](std::size_t c) {
-    matrices[c] = (1.0 + balance.damping) * cells_.rotated(static_cast<int>(c), rotations[c]);
+    matrices[c] = (1.0 + system.damping) * cells_.rotated(static_cast<int>(c), system.rotations[c]);
   });
-  system_.assemble({balance.inertia, 1.0, 1.0 + balance.damping}, matrices);
+  system_.assemble({system.inertia, 1.0, 1.0 + system.damping}, matrices);
   const Factor::Report factor = earlier.factor.factorise(system_.lower());
   if (!factor.ok) {
     report.status = SolveStatus::NotPositiveDefinite;
     report.message = name_ + ": " + factor.message;
     return false;
   }
-  earlier.inertia = balance.inertia;
-  earlier.damping = balance.damping;
-  earlier.rotations = rotations;
+  earlier.of = system;
   return true;
+}
+
+SolveReport RotatedModel::recall(const ModelMemory& memory) {
+  SolveReport report;
+  std::array<EarlierFactor*, 2> factors{&stage_factor_, &rest_factor_};
+  for (std::size_t k = 0; k < factors.size(); ++k) {
+    const bool known = k < memory.systems.size() && !memory.systems[k].rotations.empty();
+    if (!known) {
+      factors[k]->of = {};  // no stage is like it, so that the next one factors
+    } else if (!refactor(memory.systems[k], *factors[k], report)) {
+      break;
+    }
+  }
+  return report;
 }
 
 /// Mean rotation of the cells round every unknown since the factor was made.
@@ -240,7 +253,7 @@ std::vector<Eigen::Matrix3d> RotatedModel::turns_since(const EarlierFactor& earl
   std::vector<Eigen::Vector4d> sums(static_cast<std::size_t>(body_.mesh.num_vertices()),
                                     Eigen::Vector4d::Zero());
   for (std::size_t c = 0; c < rotations.size(); ++c) {
-    const Eigen::Quaterniond turn(rotations[c] * earlier.rotations[c].transpose());
+    const Eigen::Quaterniond turn(rotations[c] * earlier.of.rotations[c].transpose());
     for (int a : body_.mesh.cells[c]) {
       Eigen::Vector4d& sum = sums[static_cast<std::size_t>(a)];
       sum += sum.dot(turn.coeffs()) < 0.0 ? -turn.coeffs() : turn.coeffs();
@@ -273,8 +286,9 @@ SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotat
                                   const Enough& enough, Points& move) {
   SolveReport report;
   EarlierFactor& earlier = balance.inertia == 0.0 ? rest_factor_ : stage_factor_;
-  const bool other = earlier.inertia != balance.inertia || earlier.damping != balance.damping;
-  if ((other || !earlier.factor.ok()) && !refactor(balance, rotations, earlier, report)) return report;
+  const bool other = earlier.of.inertia != balance.inertia || earlier.of.damping != balance.damping;
+  const auto system = [&] { return ModelMemory::EarlierSystem{balance.inertia, balance.damping, rotations}; };
+  if ((other || !earlier.factor.ok()) && !refactor(system(), earlier, report)) return report;
 
   Points r = residual, dx = Points::Zero(r.rows(), 3), z, direction, image;
   std::vector<Eigen::Matrix3d> turns = turns_since(earlier, rotations);
@@ -284,7 +298,7 @@ SolveReport RotatedModel::correct(const Balance& balance, const Rotations& rotat
     if (since_factor == options_.stale_after) {
       // With a factor of this very matrix a step or two remain; more means that rounding rules.
       if (fresh) break;
-      if (!refactor(balance, rotations, earlier, report)) return report;
+      if (!refactor(system(), earlier, report)) return report;
       turns = turns_since(earlier, rotations);
       fresh = true;
       since_factor = 0;
