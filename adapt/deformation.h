@@ -11,7 +11,7 @@ namespace sinew::adapt {
 /// - a detail (level >= 1): |q_a| over the size of its cells. Details vanish under affine motion, so this is
 ///   non-affine deformation, whatever the pose;
 /// - a level-0 hat: the largest |principal stretch - 1| at the centre of a leaf cell in its support, with no
-/// regard to
+///   regard to
 ///   rotation.
 /// Both are 0 at rest and unchanged by a rigid motion. x: leaf vertices, num_vertices x 3 [m]. Throws
 /// std::invalid_argument for another size.

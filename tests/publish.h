@@ -8,7 +8,7 @@
 namespace sinew::tests {
 
 /// Keeps a measured number, printed by `format`, with the test's result: tools/tables puts it into the
-/// README's table of answers. `key` is letters, digits and _.
+/// tables of tests/measured. `key` is letters, digits and _.
 inline void publish(const std::string& key, const char* format, double value) {
   char text[64];
   std::snprintf(text, sizeof text, format, value);

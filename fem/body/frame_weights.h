@@ -8,8 +8,8 @@
 
 namespace sinew::fem {
 
-/// Skinning weights s_f of the leaf vertices, num_vertices x num_frames: rows are non-negative and sum to 1
-///. On level 0 (L + D) s_f = D sbar_f with L the uniform graph Laplacian of the lattice's
+/// Skinning weights s_f of the leaf vertices, num_vertices x num_frames: rows are non-negative and sum to 1.
+/// On level 0 (L + D) s_f = D sbar_f with L the uniform graph Laplacian of the lattice's
 /// edges, D_aa = sum_k phi_a(x_k) over the skin vertices and sbar their mean weights; bone vertices are fixed
 /// to their frame, shared equally at a joint. Finer vertices take the mean of their parents. Weights below
 /// 1e-3 are dropped and the row normalised: they cost time and move nothing visibly.

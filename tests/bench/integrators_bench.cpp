@@ -1,6 +1,6 @@
 // What every integrator does to a swing, a whip and a spin, and what it costs: a bar of 1 x 0.2 x 0.2 m in 10
 // x 2 x 2 cells, rho = 1000 kg/m^3, nu = 0.3, whose lowest frequency is 4 Hz, as neo-Hookean flesh. Prints
-// the table that the README shows.
+// the table of tests/measured/time.md.
 
 #include <array>
 #include <cmath>

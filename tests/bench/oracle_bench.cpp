@@ -1,6 +1,6 @@
 // How far every rung of the ladder is from the rung above it and from neo-Hookean flesh, on the samples and
 // the same lattice: the arm held bent by 60 and 120 degrees and twisted by 90, and the hop of the hopper.
-// Prints the table that the README shows. Usage: oracle_bench [cells of the arm [frames of the hop]].
+// Prints a table of tests/measured/accuracy.md. Usage: oracle_bench [cells of the arm [frames of the hop]].
 
 #include <cstdio>
 #include <cstdlib>

@@ -73,6 +73,14 @@ WORDS = {
 MAX_LINES = 600
 MAX_FILE_BYTES = 1_000_000
 MAX_SAMPLE_BYTES = 3_000_000
+MAX_README_BYTES = 9_000
+MAX_COLUMNS = 120
+
+# The pages that list the sources which code and pages cite.
+REFERENCES = ("lattice/METHOD.md", "fem/METHOD.md")
+CITATION = re.compile(r"\[([A-Z][A-Za-z]+\d\d[a-z]?)(?=[\],;])")
+LINK = re.compile(r"\]\(([^)\s#:]+)(?:#[^)\s]*)?\)")
+TREE_PATH = re.compile(rf"(?<![\w/.-])((?:{'|'.join(FOLDERS)})/[\w./-]*\w)")
 
 
 def tracked_files(root):
@@ -98,6 +106,10 @@ def read(root, name):
 
 def sources(root):
     return [name for name in tracked_files(root) if name.endswith((".h", ".cpp"))]
+
+
+def pages(root):
+    return [name for name in tracked_files(root) if name.endswith(".md")]
 
 
 def is_public_header(name):
@@ -211,21 +223,49 @@ def check_sizes(root):
                 yield f"{name}: {lines} lines, expected at most {MAX_LINES}, or '// Long, as ...' on the first line"
     if samples > MAX_SAMPLE_BYTES:
         yield f"assets/samples: {samples} bytes in all, expected at most {MAX_SAMPLE_BYTES}"
+    yield from check_pages(root)
+
+
+def prose_lines(text):
+    """Numbered lines of a page without its code blocks, tables and lines with an address: what can be wrapped."""
+    fenced = False
+    for line, content in enumerate(text.splitlines(), 1):
+        fence = content.startswith("```")
+        fenced ^= fence
+        if not (fenced or fence or content.startswith(("|", "    ")) or re.search(r"https?://", content)):
+            yield line, content
+
+
+def check_pages(root):
+    """Sizes of what people read."""
+    for name in pages(root):
+        text = read(root, name)
+        size = len(text.encode())
+        if name == "README.md" and size > MAX_README_BYTES:
+            yield f"{name}: {size} bytes, expected at most {MAX_README_BYTES}; pages in tools/manual hold the rest"
+        for line, content in prose_lines(text):
+            if len(content) > MAX_COLUMNS:
+                yield f"{name}:{line}: {len(content)} columns, expected at most {MAX_COLUMNS}"
 
 
 def check_references(root):
-    """Every source cited in the code stands in the README, and every path that the README names is there."""
-    readme = read(root, "README.md")
-    listed = set(re.findall(r"^- \[(\w+)\]", readme, re.MULTILINE))
-    for name in sources(root):
+    """Every source that code and pages cite is listed, and every path that a page names is there."""
+    names = pages(root)
+    listed = {key for name in REFERENCES if name in names
+              for key in re.findall(r"^- \[(\w+)\]", read(root, name), re.MULTILINE)}
+    for name in [*sources(root), *names]:
         for line, content in enumerate(read(root, name).splitlines(), 1):
-            for key in re.findall(r"\[([A-Z][A-Za-z]+\d\d[a-z]?)(?=[\],;])", content):
+            for key in CITATION.findall(content):
                 if key not in listed:
-                    yield f"{name}:{line}: [{key}]: not among the README's references"
-    for path in re.findall(r"\]\(([^)#:]+)\)|(?<![\w/])((?:assets|tools|tests)/[\w./-]+\w)", readme):
-        path = path[0] or path[1]
-        if not os.path.exists(os.path.join(root, path)):
-            yield f"README.md: {path}: not there"
+                    yield f"{name}:{line}: [{key}]: not among the references of {' and '.join(REFERENCES)}"
+    for name in names:
+        folder = os.path.dirname(name)
+        for line, content in enumerate(read(root, name).splitlines(), 1):
+            named = [(path, os.path.join(folder, path)) for path in LINK.findall(content)]
+            named += [(path, path) for path in TREE_PATH.findall(LINK.sub("", content))]
+            for path, place in named:
+                if not os.path.exists(os.path.join(root, place)):
+                    yield f"{name}:{line}: {path}: not there"
 
 
 def check_format(root):

@@ -9,7 +9,10 @@ import unittest
 import check_tree
 
 GOOD = {
-    "README.md": "# A tree\n\n![picture](assets/a.png) tools/shell/main.cpp\n\n- [Gauss09] Theoria motus.\n",
+    "README.md": "# A tree\n\n![picture](assets/a.png) [a page](tools/manual/page.md#part), tools/shell/main.cpp\n",
+    "tools/manual/page.md": "# A page\n\n[method](../../fem/METHOD.md), after [Gauss09]; `build/tools/x`, `fem/body`\n",
+    "lattice/METHOD.md": "# Lattices\n\n- [Euler44] Methodus.\n",
+    "fem/METHOD.md": "# Flesh\n\n[lattice](../lattice/METHOD.md)\n\n- [Gauss09] Theoria motus.\n",
     "assets/a.png": "picture",
     "lattice/cell.h": "#pragma once\n\n#include <vector>\n\n#include <Eigen/Core>\n",
     "lattice/detail/mesh.h": "#pragma once\n\n#include <CGAL/Mesh_3.h>\n",
@@ -102,11 +105,26 @@ class CheckTree(unittest.TestCase):
             self.write(f"assets/samples/{i}.glb", "x" * 800_000)
         self.expect("sizes", "assets/heavy.bin: 1000001 bytes", "fem/long.cpp: 601 lines", "assets/samples: 3200000")
 
-    def test_dangling_references_are_found(self):
-        self.write("fem/law.cpp", "// [Gauss09, sec. 3], [Euler44]\nint x = points[kHats12];\n")
-        self.write("README.md", "- [Gauss09] Theoria.\n\n![picture](assets/b.png), run tools/go and `tests`\n")
-        self.expect("references", "fem/law.cpp:1: [Euler44]", "README.md: assets/b.png",
-                    "README.md: tools/go")
+    def test_long_pages_are_found(self):
+        wide = "x " * 61
+        self.write("README.md", "words " * 20 + "\n" + "a line\n" * 1270)
+        self.write("tools/manual/page.md", f"# A page\n\n| {wide} |\n\n    {wide}\n\n```\n{wide}\n```\n"
+                                           f"https://example.org {wide}\n{wide}\n")
+        self.expect("sizes", "README.md: 9011 bytes, expected at most 9000", "tools/manual/page.md:11: 122 columns")
+
+    def test_sources_that_are_not_listed_are_found(self):
+        self.write("fem/law.cpp", "// [Gauss09, sec. 3], [Euler44], [Hooke78]\nint x = points[kHats12];\n")
+        self.write("tools/manual/page.md", "As in [Newton87].\n\n- [Newton87] Listed here, where no reader looks.\n")
+        self.expect("references", "fem/law.cpp:1: [Hooke78]", "tools/manual/page.md:1: [Newton87]",
+                    "tools/manual/page.md:3: [Newton87]")
+
+    def test_paths_that_are_not_there_are_found(self):
+        self.write("README.md", "![picture](assets/b.png), run tools/go and `tests`\n")
+        # Links start at the page's folder, names of files at the root of the tree.
+        self.write("tools/manual/page.md", "[root](README.md) [up](../../README.md) [far](https://example.org/x)\n")
+        self.write("fem/METHOD.md", "- [Gauss09] Theoria motus.\n\n| `fem/body/body.h`, `fem/body/gone.h` |\n")
+        self.expect("references", "README.md:1: assets/b.png", "README.md:1: tools/go",
+                    "fem/METHOD.md:3: fem/body/gone.h", "tools/manual/page.md:1: README.md")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """What tools/quickstart, tools/test, tools/tables and .ci/run say and call, with the programs they call replaced by recorders."""
 
+import datetime
 import os
 import shutil
 import subprocess
@@ -122,9 +123,10 @@ class Scripts(unittest.TestCase):
         self.assertEqual(self.called("ctest")[0].split(" ")[1:3], ["--test-dir", "build/ci"])
         self.assertTrue(self.called("ctest")[0].endswith("--label-exclude ^(bench|nightly)$"))
 
-    def readme(self, text=None):
-        path = os.path.join(self.root, "README.md")
+    def page(self, name, text=None):
+        path = os.path.join(self.root, "tests/measured", name)
         if text is not None:
+            os.makedirs(os.path.dirname(path), exist_ok=True)
             with open(path, "w", encoding="utf-8") as stream:
                 stream.write(text)
         with open(path, encoding="utf-8") as stream:
@@ -133,28 +135,48 @@ class Scripts(unittest.TestCase):
     def bench(self, name, body):
         self.program(name, body, os.path.join(self.root, "build/release/tools"))
 
+    def commit(self, name, changes=""):
+        self.program("git", f'[[ $1 == rev-parse ]] && echo {name} || echo "{changes}"')
+
     def test_tables_are_replaced_between_their_marks(self):
-        old = "a\n\n<!-- table {} -->\n\n| old |\n\n<!-- /table -->\n\nb\n"
-        self.readme(old.format("oracle") + old.format("models"))
+        old = "a\n\n<!-- table {} -->\n\n*2001-02-03, commit 1234567*\n\n| old |\n\n<!-- /table -->\n\nb\n"
+        head = "| oracle | `x` | 2001-02-03 | 1234567 |\n| models | `y` | 2001-02-03 | 1234567 |\n\n"
+        self.page("one.md", head + old.format("oracle") + old.format("models"))
+        self.page("two.md", old.format("bar"))
         self.bench("oracle_bench", "echo '| new |'")
+        self.commit("89abcde")
         result = self.run_script("tools/tables", "--only", "oracle")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
-        self.assertEqual(self.readme(), old.format("oracle").replace("old", "new") + old.format("models"))
+        today = datetime.date.today().isoformat()
+        new = old.replace("old", "new").replace("2001-02-03", today).replace("1234567", "89abcde")
+        self.assertEqual(self.page("one.md"),
+                         head.replace("2001-02-03 | 1234567", today + " | 89abcde", 1)
+                         + new.format("oracle") + old.format("models"))
+        self.assertEqual(self.page("two.md"), old.format("bar"))
         self.assertIn("cmake --build --preset release --target oracle_bench", self.called("cmake"))
+        self.assertIn("written: tests/measured/one.md; git diff tests/measured shows", result.stdout)
+
+    def test_tables_of_a_tree_with_changes_say_so(self):
+        self.page("one.md", "<!-- table oracle -->\n\n<!-- /table -->\n")
+        self.bench("oracle_bench", "echo '| new |'")
+        self.commit("89abcde", " M fem/body.cpp")
+        self.assertEqual(self.run_script("tools/tables", "--only", "oracle").returncode, 0)
+        self.assertIn(", commit 89abcde with changes*\n\n| new |\n", self.page("one.md"))
 
     def test_tables_hold_what_tests_kept(self):
-        self.readme("<!-- table bar -->\n\n<!-- /table -->\n")
+        self.page("one.md", "<!-- table bar -->\n\n<!-- /table -->\n")
         values = [f"sag_{level}" for level in (1, 2, 3)] + ["release_1", "release_2"]
         values += [f"mode_{level}_{mode}" for level in (1, 2) for mode in range(6)]
         kept = "".join(f'<property name="{name}" value="of {name}"/>' for name in values)
         self.bench("fem_reference_test", f"echo '{kept}' >\"${{2#--gtest_output=xml:}}\"")
         result = self.run_script("tools/tables", "--only", "bar")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
-        self.assertIn("| sag under its weight | of sag_1 % | of sag_2 % | of sag_3 % |", self.readme())
+        self.assertIn("| sag under its weight | of sag_1 % | of sag_2 % | of sag_3 % |", self.page("one.md"))
 
     def test_tables_are_all_made_or_none_is_written(self):
-        text = "<!-- table oracle -->\n\n<!-- /table -->\n<!-- table bar -->\n\n<!-- /table -->\n"
-        self.readme(text)
+        first, second = "<!-- table oracle -->\n\n<!-- /table -->\n", "<!-- table bar -->\n\n<!-- /table -->\n"
+        self.page("one.md", first)
+        self.page("two.md", second)
         self.bench("oracle_bench", "echo '| new |'")
         self.bench("fem_reference_test", "exit 1")
         result = self.run_script("tools/tables", "--only", "oracle,bar")
@@ -164,17 +186,21 @@ class Scripts(unittest.TestCase):
         self.bench("fem_reference_test", 'echo >"${2#--gtest_output=xml:}"')
         result = self.run_script("tools/tables", "--only", "oracle,bar")
         self.assertEqual((result.returncode, result.stderr), (1, "tables: table bar: no test kept 'sag_1'\n"))
-        self.assertEqual(self.readme(), text)
+        self.assertEqual((self.page("one.md"), self.page("two.md")), (first, second))
 
     def test_tables_refuse_a_table_that_is_not(self):
         result = self.run_script("tools/tables", "--only", "weather")
         self.assertEqual(result.returncode, 2)
         self.assertIn("--only: got weather, expected models, speed,", result.stderr)
-        self.readme("no marks\n")
+        marks = "<!-- table oracle -->\n\n<!-- /table -->\n"
         self.bench("oracle_bench", "echo '| new |'")
-        result = self.run_script("tools/tables", "--only", "oracle")
-        self.assertEqual((result.returncode, result.stderr),
-                         (1, "tables: README.md: expected one pair <!-- table oracle --> ... <!-- /table -->\n"))
+        for one, two, got in (("no marks\n", "none\n", 0), (marks, marks, 2)):
+            self.page("one.md", one)
+            self.page("two.md", two)
+            result = self.run_script("tools/tables", "--only", "oracle")
+            self.assertEqual((result.returncode, result.stderr),
+                             (1, "tables: tests/measured/*.md: expected one pair <!-- table oracle --> ... "
+                                 f"<!-- /table -->, got {got}\n"))
 
     def test_no_install_names_what_is_missing(self):
         self.installed('[[ $* == *" libfmt-dev" || $* == *" cmake" ]] || echo installed')

@@ -98,7 +98,7 @@ TEST(ReferenceBar, KeepsItsAccuracyUnderLocalRefinement) {
   }
 }
 
-// Reference values of README.md, 1e-4 relative. Order: bending (twice), torsion, bending (twice), axial.
+// Values of ../shared/reference, 1e-4 relative. Order: bending (twice), torsion, bending (twice), axial.
 // Section 4's 2 % of the sag is 1 % of the first frequency; higher modes bend more per cell, and torsion of a
 // square section with two cells across is the worst. From level 1 to 2 every error falls by at least half.
 TEST(ReferenceBar, ClampedFrequenciesConverge) {

@@ -1,5 +1,5 @@
-// Builds the lattices of many rigs in several sizes and prints their quality as a table: the one in the
-// README comes from here.
+// Builds the lattices of many rigs in several sizes and prints their quality as a table: the one in
+// tests/measured/lattices.md comes from here.
 #include <algorithm>
 #include <cstdio>
 #include <ctime>

@@ -1,5 +1,5 @@
-// Simulates many rigs with no option given and prints as a table what became of their skins: the one in the
-// README comes from here.
+// Simulates many rigs with no option given and prints as a table what became of their skins: the one in
+// tests/measured/verdicts.md comes from here.
 #include <algorithm>
 #include <atomic>
 #include <cmath>

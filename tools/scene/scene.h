@@ -134,7 +134,7 @@ struct Scene {
   /// Finest active level of the hierarchy [-]; 0 ... 3. 1, as tetrahedra of level 0 alone are far too stiff.
   int levels = 1;
 
-  /// Young's modulus [Pa]; 1e-3 ... 1e12. Unset: chosen so that the flesh swings at about 8 Hz.
+  /// Young's modulus [Pa]; 1e-3 ... 1e12. Unset: chosen so that the flesh swings at 7 Hz at 1.8 m.
   std::optional<double> young;
   /// Poisson's ratio [-]; in (-1, 0.5). Soft tissue hardly changes its volume.
   double poisson = 0.45;
