@@ -89,14 +89,44 @@ void clear_partials(const fs::path& target, const std::string& shown) {
   }
 }
 
+/// The folders above an output that were not there. Without keep() those that are still empty go again: a run
+/// that fails leaves no trail of them.
+class NewFolders {
+ public:
+  NewFolders(const fs::path& folder, const std::string& shown) {
+    std::vector<fs::path> missing;
+    std::error_code ignored;
+    for (fs::path at = folder; !fs::exists(fs::symlink_status(at, ignored)); at = at.parent_path())
+      missing.push_back(at);
+    for (auto at = missing.rbegin(); at != missing.rend(); ++at) {
+      if (::mkdir(at->c_str(), 0777) == 0) {
+        made_.push_back(at->string());
+      } else if (errno != EEXIST) {  // another process may have been faster
+        const int reason = errno;
+        remove(made_);
+        fail(shown, "cannot make folder '" + at->string() + "'", reason);
+      }
+    }
+  }
+  ~NewFolders() { remove(made_); }
+  NewFolders(const NewFolders&) = delete;
+  NewFolders& operator=(const NewFolders&) = delete;
+
+  std::vector<std::string> keep() { return std::exchange(made_, {}); }
+
+  static void remove(const std::vector<std::string>& made) {
+    for (auto at = made.rbegin(); at != made.rend(); ++at) ::rmdir(at->c_str());
+  }
+
+ private:
+  std::vector<std::string> made_;  ///< from the top down.
+};
+
 /// Holds the lock of the parent folder, so that of two processes that start together one sees the other's
 /// sibling.
 Descriptor lock_parent(const fs::path& target, const std::string& shown) {
   const fs::path parent = target.parent_path();
   Descriptor fd(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  // Not made on the fly: a misspelt path would leave a trail of folders.
-  if (fd.get() < 0 && errno == ENOENT)
-    throw IoError(fmt::format("{}: folder '{}' does not exist; hint: make it first", shown, parent.string()));
   if (fd.get() < 0) fail(shown, "cannot open folder '" + parent.string() + "'", errno);
   if (::access(parent.c_str(), W_OK | X_OK) != 0)
     fail(shown, "cannot write in folder '" + parent.string() + "'", errno);
@@ -139,7 +169,7 @@ void check_replaceable(const fs::path& target, const std::string& shown, Overwri
   std::sort(names.begin(), names.end());
   if (overwrite == Overwrite::Refuse)
     throw BusyError(
-        fmt::format("{}: is not empty, it holds '{}'{}; hint: --overwrite replaces an earlier run", shown,
+        fmt::format("{}: is not empty, it holds '{}'{}; hint: `overwrite` replaces an earlier run", shown,
                     names.front(), names.size() > 1 ? fmt::format(" and {} more", names.size() - 1) : ""));
   for (const std::string& name : names)
     if (std::find(own_names.begin(), own_names.end(), name) == own_names.end())
@@ -172,12 +202,13 @@ void put_in_place(const fs::path& partial, const fs::path& target, const std::st
 void write_file(const std::string& path, std::string_view bytes, Overwrite overwrite) {
   const fs::path target = absolute_target(path);
   const fs::path partial = target.parent_path() / (partial_prefix(target) + std::to_string(::getpid()));
+  NewFolders folders(target.parent_path(), path);
   const Descriptor parent = lock_parent(target, path);
   clear_partials(target, path);
   std::error_code error;
   if (fs::is_directory(target, error)) throw IoError(path + ": is a folder, expected a file or a new name");
   if (overwrite == Overwrite::Refuse && fs::exists(target, error))
-    throw BusyError(path + ": exists already; hint: --overwrite replaces it");
+    throw BusyError(path + ": exists already; hint: `overwrite` replaces it");
   const Descriptor file(::open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (file.get() < 0) fail(path, "cannot be created", errno);
   try {
@@ -189,6 +220,7 @@ void write_file(const std::string& path, std::string_view bytes, Overwrite overw
     ::unlink(partial.c_str());
     throw;
   }
+  folders.keep();
   sync_path(target.parent_path(), path);
 }
 
@@ -196,6 +228,7 @@ OutputDirectory::OutputDirectory(const std::string& path, Overwrite overwrite,
                                  const std::vector<std::string>& own_names)
     : shown_(path), overwrite_(overwrite), own_names_(own_names) {
   const fs::path target = absolute_target(path);
+  NewFolders folders(target.parent_path(), path);
   const Descriptor parent = lock_parent(target, path);
   clear_partials(target, path);
   check_replaceable(target, path, overwrite, own_names);
@@ -209,6 +242,7 @@ OutputDirectory::OutputDirectory(const std::string& path, Overwrite overwrite,
     fs::remove_all(partial);
     fail(path, "cannot be created", reason);
   }
+  made_ = folders.keep();
 }
 
 OutputDirectory::~OutputDirectory() {
@@ -216,6 +250,7 @@ OutputDirectory::~OutputDirectory() {
   std::error_code ignored;
   if (!partial_.empty()) fs::remove_all(partial_, ignored);
   if (lock_ >= 0) ::close(lock_);
+  NewFolders::remove(made_);
 }
 
 void OutputDirectory::write(const std::string& name, std::string_view bytes) const {
@@ -240,6 +275,7 @@ void OutputDirectory::commit() {
   fs::remove_all(partial, error);
   if (error) fail(shown_, "the new output is in place, but the earlier one cannot be removed", error.value());
   partial_.clear();
+  made_.clear();
 }
 
 }  // namespace sinew::assets

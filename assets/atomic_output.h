@@ -11,8 +11,9 @@ namespace sinew::assets {
 /// What to do where the output exists already.
 enum class Overwrite { Refuse, Replace };
 
-/// Writes one file. `path` may not exist unless overwriting. Throws BusyError where it exists or another
-/// process is writing it, IoError for anything the system refuses (with its words and the path).
+/// Writes one file, and the folders above it that are missing. `path` may not exist unless overwriting.
+/// Throws BusyError where it exists or another process is writing it, IoError for anything the system refuses
+/// (with its words and the path).
 void write_file(const std::string& path, std::string_view bytes, Overwrite overwrite);
 
 /// A folder of outputs. Between construction and commit() the files live in a sibling folder
@@ -21,10 +22,11 @@ void write_file(const std::string& path, std::string_view bytes, Overwrite overw
 /// next one that writes the same output.
 class OutputDirectory {
  public:
-  /// Tests all that can be tested before the work starts: the parent exists and can be written, `path` is no
-  /// file, nobody else is writing it, and what it holds may be replaced. An empty folder may always be; any
-  /// content needs Overwrite::Replace and must consist of entries named in `own_names` (what a run may have
-  /// written before): a folder with anything else is never removed. Throws IoError or BusyError.
+  /// Tests all that can be tested before the work starts: the parent can be written (it is made where it is
+  /// missing, and goes again unless commit() is reached), `path` is no file, nobody else is writing it, and
+  /// what it holds may be replaced. An empty folder may always be; any content needs Overwrite::Replace and
+  /// must consist of entries named in `own_names` (what a run may have written before): a folder with
+  /// anything else is never removed. Throws IoError or BusyError.
   OutputDirectory(const std::string& path, Overwrite overwrite, const std::vector<std::string>& own_names);
   ~OutputDirectory();
   OutputDirectory(const OutputDirectory&) = delete;
@@ -45,7 +47,8 @@ class OutputDirectory {
   std::string partial_;  ///< the sibling, absolute.
   Overwrite overwrite_;
   std::vector<std::string> own_names_;
-  int lock_ = -1;  ///< open and locked for as long as the sibling is ours.
+  std::vector<std::string> made_;  ///< folders above it that were not there.
+  int lock_ = -1;                  ///< open and locked for as long as the sibling is ours.
 };
 
 }  // namespace sinew::assets

@@ -247,7 +247,7 @@ LatticeFormat lattice_format(const std::string& file, const std::string& name) {
   }
   if (is_known)
     throw ConfigError(
-        fmt::format("--format: got '{}', which does not fit the extension '{}'", name, extension));
+        fmt::format("format: got '{}', which does not fit the extension '{}'", name, extension));
   throw ConfigError(fmt::format(
       "{}: extension, got '{}', expected .vtu, .vtk, .msh, .mesh, .node, .ele or .veg", file, extension));
 }

@@ -14,7 +14,7 @@
 
 #include "assets/detail/file_bytes.h"
 #include "assets/error.h"
-#include "assets/pc2.h"
+#include "assets/point_cache.h"
 
 namespace sinew::assets {
 namespace {

@@ -31,21 +31,6 @@ static_assert(sizeof(Header) == 32);
 
 }  // namespace
 
-FloatPoints to_float(const lattice::Points& points) {
-  constexpr double kMost = std::numeric_limits<float>::max();
-  FloatPoints floats(points.rows(), 3);
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      const double x = points(i, c);
-      if (!(std::abs(x) <= kMost))  // true for NaN
-        throw std::domain_error(fmt::format(
-            "vertex {}, {}: {}, expected a finite number within the range of a float", i, "xyz"[c], x));
-      floats(i, c) = static_cast<float>(x);
-    }
-  }
-  return floats;
-}
-
 Pc2Writer::Pc2Writer(const std::string& file, int num_points, double first_frame)
     : file_(file), num_points_(num_points) {
   if (num_points < 1) throw std::invalid_argument("Pc2Writer: num_points must be positive");

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "lattice/points.h"
+#include "assets/point_cache.h"
 
 /// Point caches (PC2): a 32-byte header and then every sample's positions as 32-bit floats, all
 /// little-endian.
@@ -19,27 +19,21 @@
 ///     then         float32  x y z of point 0 of sample 0, of point 1, ...
 namespace sinew::assets {
 
-using FloatPoints = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
-
-/// The positions as they are stored. Throws std::domain_error naming the vertex where a coordinate is not
-/// finite or beyond the range of a float.
-FloatPoints to_float(const lattice::Points& points);
-
 /// Writes a cache sample by sample. Until finish() the header says that there are no samples.
-class Pc2Writer {
+class Pc2Writer final : public PointCacheWriter {
  public:
   /// Throws IoError naming the file, std::invalid_argument where num_points < 1.
   Pc2Writer(const std::string& file, int num_points, double first_frame = 0.0);
-  ~Pc2Writer();
+  ~Pc2Writer() override;
   Pc2Writer(const Pc2Writer&) = delete;
   Pc2Writer& operator=(const Pc2Writer&) = delete;
 
   /// Appends one sample, num_points x 3. Throws std::invalid_argument for another size, std::domain_error as
   /// to_float, IoError naming the file and the sample.
-  void write(const lattice::Points& points);
+  void write(const lattice::Points& points) override;
 
   /// Enters the number of samples and closes the file. Throws IoError.
-  void finish();
+  void finish() override;
 
   int num_samples() const { return num_samples_; }
 
@@ -53,19 +47,19 @@ class Pc2Writer {
 };
 
 /// Reads a cache.
-class Pc2Reader {
+class Pc2Reader final : public PointCacheReader {
  public:
   /// Throws IoError where the file cannot be read, InputError where it is no PC2 file or not as long as its
   /// header says.
   explicit Pc2Reader(const std::string& file);
 
-  int num_points() const { return num_points_; }
-  int num_samples() const { return num_samples_; }
-  double first_frame() const { return first_frame_; }
-  double frames_per_sample() const { return frames_per_sample_; }
+  int num_points() const override { return num_points_; }
+  int num_samples() const override { return num_samples_; }
+  double first_frame() const override { return first_frame_; }
+  double frames_per_sample() const override { return frames_per_sample_; }
 
   /// Positions of a sample, 0 <= sample < num_samples. Throws std::out_of_range, IoError.
-  FloatPoints read(int sample) const;
+  FloatPoints read(int sample) const override;
 
  private:
   struct Close {

@@ -22,6 +22,18 @@ double extent_along_y(const Points& points) {
   return points.rows() == 0 ? 0.0 : points.col(1).maxCoeff() - points.col(1).minCoeff();
 }
 
+/// The cache of a run in its output folder: of the first format of which there is one.
+std::string cache_in(const std::string& folder) {
+  std::string first;
+  for (const PointCacheFormat& format : point_cache_formats()) {
+    const fs::path file = fs::path(folder) / ("skin" + std::string(format.extension));
+    std::error_code ignored;
+    if (fs::exists(file, ignored)) return file.string();
+    if (first.empty()) first = file.string();
+  }
+  return first;
+}
+
 /// A member of the sidecar; what is missing or of another type makes it no sidecar of ours.
 template <class T>
 T member(const std::string& file, const Json& json, const Json::json_pointer& at) {
@@ -37,7 +49,7 @@ T member(const std::string& file, const Json& json, const Json::json_pointer& at
 Result::Result(const std::string& path) : path_(path) {
   std::error_code ignored;
   const bool folder = fs::is_directory(path, ignored);
-  const std::string cache = folder ? (fs::path(path) / "skin.pc2").string() : path;
+  const std::string cache = folder ? cache_in(path) : path;
   const fs::file_status status = fs::status(cache, ignored);
   if (!fs::exists(status)) {
     throw IoError(fmt::format("{}: not found ({}){}", cache, fs::absolute(cache, ignored).string(),
@@ -45,7 +57,7 @@ Result::Result(const std::string& path) : path_(path) {
   }
   // A pipe might never answer.
   if (!fs::is_regular_file(status)) throw IoError(cache + ": not a regular file");
-  cache_ = std::make_unique<Pc2Reader>(cache);
+  cache_ = read_point_cache(cache);
   first_frame_ = static_cast<int>(std::lround(cache_->first_frame()));
   const std::string sidecar = fs::path(cache).replace_extension(".json").string();
   if (folder || fs::exists(sidecar, ignored)) read_sidecar(sidecar);

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "assets/pc2.h"
+#include "assets/point_cache.h"
 
 /// Reading back what a run has written: the frames of a point cache in metres, Y up, whatever the cache's own
 /// units.
@@ -12,7 +12,7 @@ namespace sinew::assets {
 /// One result, opened. Reads frames from the disk when asked: a result may be larger than the memory.
 class Result {
  public:
-  /// `path`: an output folder of a run (skin.pc2 with skin.json and its rest mesh), or a PC2 file, with or
+  /// `path`: an output folder of a run (skin.pc2 with skin.json and its rest mesh), or a point cache, with or
   /// without a sidecar of the same name beside it. Throws IoError where a file cannot be read, InputError
   /// where one is damaged or they do not fit each other.
   explicit Result(const std::string& path);
@@ -37,7 +37,7 @@ class Result {
   lattice::Points in_metres(const lattice::Points& points) const;
 
   std::string path_;
-  std::unique_ptr<Pc2Reader> cache_;
+  std::unique_ptr<PointCacheReader> cache_;
   lattice::Points rest_;
   Eigen::Matrix3d metres_from_file_ = Eigen::Matrix3d::Identity();
   int first_frame_ = 0;

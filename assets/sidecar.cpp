@@ -24,10 +24,10 @@ Json vertex_order_json(VertexOrder order) {
               {"note",
                "the importer split and reordered the rig file's vertices: use the rest mesh beside this "
                "cache, or "
-               "--output-mesh for an order of your own"}};
+               "output_mesh for an order of your own"}};
     case VertexOrder::OutputMesh:
       return {{"source", "output-mesh"},
-              {"note", "vertices are in the order of the mesh given as --output-mesh"}};
+              {"note", "vertices are in the order of the mesh given as output_mesh"}};
   }
   throw std::invalid_argument("sidecar: unknown vertex order");
 }

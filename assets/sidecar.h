@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "assets/pc2.h"
+#include "assets/point_cache.h"
 #include "assets/rig.h"
 
 /// The JSON file beside a point cache: what a reader needs to know before it trusts the cache.

@@ -146,8 +146,8 @@ std::string missing_chains(const CellComplex& complex, const Neighbours& neighbo
   if (missing.size() > kShown) line += fmt::format(", ... and {} more", missing.size() - kShown);
   if (missing.size() > 1) line += ')';
   return line +
-         "; hint: mesh with the bones as edges, allow more with --snap-tolerance, or hold such bones by "
-         "penalty with --soft-bones";
+         "; hint: mesh with the bones as edges, allow more with `snap_tolerance`, or hold such bones by "
+         "penalty with `soft_bones`";
 }
 
 }  // namespace
@@ -216,7 +216,7 @@ std::string skin_outside(const CellComplex& complex, const Surface& skin) {
   }
   return fmt::format(
       "{} of {} skin vertices lie outside the lattice, the farthest, {}, by {:.3g} m: {}; hint: make the "
-      "lattice larger, or mind its units: metres and Y up, or the rig's with --lattice-space file",
+      "lattice larger, or mind its units: metres and Y up, or the rig's with `lattice_space` file",
       outside.size(), skin.points.rows(), which, farthest, number_list(outside));
 }
 
@@ -228,7 +228,7 @@ std::string parts_without_bone(const ControlLattice& lattice, const Numbering& n
   return fmt::format(
       "cell {}: belongs to a part of {} cells that no bone reaches ({} of {} parts; its cells: {}); hint: "
       "remove "
-      "the part, join it to the rest, or tie such parts to their joints with --soft-bones",
+      "the part, join it to the rest, or tie such parts to their joints with `soft_bones`",
       numbers.front(), floating.front().size(), floating.size(), components(lattice.complex).size(),
       number_list(numbers));
 }

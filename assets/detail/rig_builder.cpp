@@ -434,7 +434,7 @@ class RigBuilder {
     } else if (moving.size() > 1) {
       find(Finding::Severity::Info, "several-clips", "",
            std::to_string(moving.size()) + " clips; " + moving.front() +
-               " is taken unless --clip names another");
+               " is taken unless `clip` names another");
     }
     if (num_flesh > 0) judge_joints();
   }

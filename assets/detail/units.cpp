@@ -47,7 +47,7 @@ double metres_per_unit(const BodySize& body, const DeclaredUnit& declared, doubl
     const double power = static_cast<double>(k / 2);
     factors[4 + k] = k % 2 == 0 ? std::pow(10.0, -3.0 - power) : std::pow(10.0, 1.0 + power);
   }
-  const char* remedy = "state the true height with --height";
+  const char* remedy = "state the true height with `height`";
   for (const double factor : factors) {
     if (!kUsual.contains(factor * body.longest)) continue;
     const std::string said = declared.metres > 0.0 ? "the file's own unit of " + number(declared.metres) +

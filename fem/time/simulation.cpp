@@ -73,7 +73,7 @@ Simulation::Simulation(const Body& body, Motion motion, double start_time, const
     throw std::invalid_argument(
         "integrator: tr-bdf2 and implicit-midpoint step blended flesh of one region, got " +
         std::to_string(body.regions.size()) +
-        " regions; hint: bdf2, or another --model such as corotational");
+        " regions; hint: bdf2, or another `model` such as corotational");
   }
   if (model_->may_gain_energy()) energy_cap_.emplace(body, options_.gravity);
   moving_.counter.start = start_time;
@@ -137,7 +137,7 @@ bool Simulation::check(SimulationReport& report) const {
   report.status = SimulationStatus::Diverged;
   report.message = "the flesh of '" + joint_of(worst) + "' diverged at " +
                    std::to_string(moving_.flesh.time) +
-                   " s; a smaller --step, more --damping or --integrator backward-euler helps";
+                   " s; a smaller `step`, more `damping` or `integrator` backward-euler helps";
   return false;
 }
 

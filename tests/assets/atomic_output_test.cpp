@@ -95,7 +95,7 @@ TEST_F(AtomicOutput, AnotherRunNeedsOverwriteAndIsThenReplacedWhole) {
   put(at("run/skin.json"), "old");
   EXPECT_THAT([&] { OutputDirectory(at("run"), Overwrite::Refuse, own_); },
               ThrowsMessage<BusyError>(at("run") +
-                                       ": is not empty, it holds 'skin.json' and 1 more; hint: --overwrite "
+                                       ": is not empty, it holds 'skin.json' and 1 more; hint: `overwrite` "
                                        "replaces an earlier run"));
   OutputDirectory out(at("run"), Overwrite::Replace, own_);
   put(out.file("skin.pc2"), "new");
@@ -138,11 +138,24 @@ TEST_F(AtomicOutput, AFileInThePlaceOfTheFolderIsAnIoError) {
   EXPECT_EQ(get(at("run")), "text");
 }
 
-TEST_F(AtomicOutput, AMissingParentIsFoundBeforeTheWorkStarts) {
-  EXPECT_THAT([&] { OutputDirectory(at("no/such/run"), Overwrite::Refuse, own_); },
-              ThrowsMessage<IoError>(
-                  AllOf(HasSubstr(at("no/such")), HasSubstr("does not exist; hint: make it first"))));
+TEST_F(AtomicOutput, MissingParentsAreMadeAndGoAgainWhereNothingCameOfIt) {
+  { const OutputDirectory out(at("no/such/run"), Overwrite::Refuse, own_); }
   EXPECT_THAT(entries(), IsEmpty());
+  {
+    OutputDirectory out(at("no/such/run"), Overwrite::Refuse, own_);
+    out.write("skin.pc2", "x");
+    out.commit();
+  }
+  EXPECT_EQ(get(at("no/such/run/skin.pc2")), "x");
+  write_file(at("one/more/file"), "y", Overwrite::Refuse);
+  EXPECT_EQ(get(at("one/more/file")), "y");
+}
+
+TEST_F(AtomicOutput, AParentThatIsAFileIsAnIoError) {
+  put(at("file"), "text");
+  EXPECT_THROW(OutputDirectory(at("file/run"), Overwrite::Refuse, own_), IoError);
+  EXPECT_THROW(OutputDirectory(at("file/deep/run"), Overwrite::Refuse, own_), IoError);
+  EXPECT_EQ(get(at("file")), "text");
 }
 
 TEST_F(AtomicOutput, ALinkLoopIsAnIoErrorWithTheSystemsWords) {
@@ -274,7 +287,7 @@ TEST_F(AtomicOutput, SingleFilesFollowTheSameRules) {
   write_file(at("a.vtu"), "one", Overwrite::Refuse);
   EXPECT_EQ(get(at("a.vtu")), "one");
   EXPECT_THAT([&] { write_file(at("a.vtu"), "two", Overwrite::Refuse); },
-              ThrowsMessage<BusyError>(at("a.vtu") + ": exists already; hint: --overwrite replaces it"));
+              ThrowsMessage<BusyError>(at("a.vtu") + ": exists already; hint: `overwrite` replaces it"));
   write_file(at("a.vtu"), "two", Overwrite::Replace);
   EXPECT_EQ(get(at("a.vtu")), "two");
   EXPECT_THAT(entries(), ElementsAre("a.vtu"));

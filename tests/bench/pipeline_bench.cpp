@@ -12,6 +12,7 @@
 
 #include "fem/models/detail/blended_solver.h"
 #include "tools/session/character.h"
+#include "tools/session/run_settings.h"
 
 namespace sinew {
 namespace {
@@ -25,7 +26,7 @@ tools::Scene scene() {
 
 /// Loaded, built and assembled once; counts printed first.
 struct Setup {
-  tools::Character character = tools::make_character(scene(), [](const std::string&) {});
+  tools::Character character = tools::make_character(scene(), {});
   fem::Body body = tools::make_body(character);
 
   Setup() {
@@ -113,7 +114,7 @@ void StepPlainLinear(benchmark::State& state) {
 
 void WholeClip(benchmark::State& state) {
   for (auto _ : state) {
-    const tools::Character character = tools::make_character(scene(), [](const std::string&) {});
+    const tools::Character character = tools::make_character(scene(), {});
     const fem::Body body = tools::make_body(character);
     fem::Simulation simulation = setup().simulation(body, fem::Precision::Double);
     if (simulation.settle().status != fem::SimulationStatus::Ok) state.SkipWithError("settling failed");

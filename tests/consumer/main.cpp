@@ -1,15 +1,28 @@
+// Two frames of a rig through the installed package.
 #include <cstdio>
 
-#include "assets/rig.h"
-#include "lattice/control_lattice.h"
-#include "skeleton/skeleton.h"
+#include "tools/session/session.h"
 
-int main() {
-  sinew::skeleton::Skeleton skeleton({{.name = "root"}, {.name = "tip", .parent = 0}});
-  sinew::lattice::CellComplex tetrahedron;
-  tetrahedron.points = (sinew::lattice::Points(4, 3) << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1).finished();
-  tetrahedron.cells = {{sinew::lattice::CellType::Tetrahedron, {0, 1, 2, 3}}};
-  std::printf("%d joints, volume %.6f, %d vertices\n", skeleton.num_joints(),
-              sinew::lattice::cell_volume(tetrahedron, tetrahedron.cells[0]),
-              sinew::assets::num_vertices(sinew::assets::Rig{}));
+namespace {
+
+class Print final : public sinew::tools::FrameSink {
+ public:
+  void take(const sinew::tools::Frame& frame) override {
+    std::printf("frame %d: %d vertices, %s\n", frame.report.frame, static_cast<int>(frame.positions.rows()),
+                frame.positions.allFinite() && frame.positions != frame.skinned ? "moved" : "as skinned");
+  }
+};
+
+}  // namespace
+
+int main(int, char** argv) {
+  sinew::tools::Scene scene;
+  scene.rig = argv[1];
+  scene.frames = sinew::tools::FrameRange{0, 1};
+  scene.cells = 150;
+  sinew::tools::Session session(scene);
+  Print print;
+  sinew::tools::FrameSink* sinks[] = {&print};
+  const sinew::tools::RunReport report = session.run(sinks);
+  std::printf("%zu frames\n", report.frames.size());
 }

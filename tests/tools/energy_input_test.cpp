@@ -8,6 +8,7 @@
 
 #include "fem/report/measures.h"
 #include "tools/session/character.h"
+#include "tools/session/run_settings.h"
 
 namespace sinew::tools {
 namespace {
@@ -56,7 +57,7 @@ TEST_P(EnergyInput, IsAllThatTheFleshHas) {
   scene.cells = 300;
   scene.damping = 0.0;
   scene.cache = Switch::Off;
-  const Character character = make_character(scene, [](const std::string&) {});
+  const Character character = make_character(scene, {});
   const fem::Body body = make_body(character);
   fem::SimulationOptions options = simulation_options(scene, character, body);
   options.step = 1.0 / 480.0;  // short, as the middle of a step stands for it

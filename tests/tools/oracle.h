@@ -7,6 +7,7 @@
 
 #include "fem/time/equilibrium.h"
 #include "tools/session/character.h"
+#include "tools/session/run_settings.h"
 
 /// The skin of bundled samples on any rung of the ladder, held in a pose or moving.
 namespace sinew::tests {
@@ -19,8 +20,7 @@ struct OracleSample {
   fem::Body body;
 
   explicit OracleSample(const tools::Scene& scene)
-      : character(tools::make_character(scene, [](const std::string&) {})),
-        body(tools::make_body(character)) {}
+      : character(tools::make_character(scene, {})), body(tools::make_body(character)) {}
 };
 
 inline tools::Scene sample_scene(const char* sample, const char* clip, int cells) {

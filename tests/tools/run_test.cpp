@@ -17,11 +17,14 @@
 
 #include "assets/error.h"
 #include "tests/tools/run_command.h"
-#include "tools/support/exit_code.h"
-#include "tools/support/failure.h"
-#include "tools/support/interrupt.h"
-#include "tools/support/progress.h"
+#include "tools/support/errors.h"
 #include "tools/support/suggest.h"
+#include "tools/support/text.h"
+#include "tools/terminal/caller.h"
+#include "tools/terminal/exit_code.h"
+#include "tools/terminal/failure.h"
+#include "tools/terminal/interrupt.h"
+#include "tools/terminal/progress.h"
 
 namespace sinew::tools {
 namespace {
@@ -40,7 +43,6 @@ Failure failure_of(const Error& error) {
 
 TEST(Failure, MapsEveryKindOfErrorToItsExitCode) {
   EXPECT_EQ(failure_of(assets::ConfigError("c")).exit_code, 2);
-  EXPECT_EQ(failure_of(std::invalid_argument("dt: got 0")).exit_code, 2);
   EXPECT_EQ(failure_of(assets::InputError("a.glb", "no skin")).exit_code, 3);
   EXPECT_EQ(failure_of(NumericalError("step 3")).exit_code, 4);
   EXPECT_EQ(failure_of(assets::IoError("i")).exit_code, 5);
@@ -50,8 +52,8 @@ TEST(Failure, MapsEveryKindOfErrorToItsExitCode) {
   EXPECT_EQ(failure_of(assets::LimitError("l")).exit_code, 6);
   EXPECT_EQ(failure_of(std::bad_alloc()).exit_code, 6);
   EXPECT_EQ(failure_of(assets::BusyError("b")).exit_code, 7);
-  EXPECT_EQ(failure_of(Interrupted(2, "stopped")).exit_code, 130);
-  EXPECT_EQ(failure_of(Interrupted(15, "stopped")).exit_code, 143);
+  EXPECT_EQ(failure_of(Stopped("stopped")).exit_code, 128);  // and the number of the signal that came
+  EXPECT_EQ(failure_of(std::invalid_argument("dt: got 0")).exit_code, 1) << "a bug of ours";
   EXPECT_EQ(failure_of(std::runtime_error("r")).exit_code, 1);
   EXPECT_EQ(failure_of(std::logic_error("r")).exit_code, 1);
   EXPECT_EQ(failure_of(42).exit_code, 1);
@@ -97,7 +99,7 @@ TEST(ProgressLine, TellsShareAndTimeLeft) {
 /// What a command does between two steps.
 [[noreturn]] void poll_and_exit() {
   try {
-    stop_if_interrupted("after frame 3");
+    quiet_caller().stop_if_asked("after frame 3");
   } catch (...) {
     const Failure failure = describe_failure(std::current_exception());
     std::fputs(failure.message.c_str(), stderr);

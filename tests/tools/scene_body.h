@@ -39,7 +39,7 @@ struct SceneBody {
  private:
   tools::Character make() const {
     scene.validate();
-    return tools::make_character(scene, [](const std::string&) {});
+    return tools::make_character(scene, {});
   }
 };
 

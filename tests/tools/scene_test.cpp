@@ -394,5 +394,12 @@ TEST(SceneMaterials, RefuseAPatternThatFitsNoBone) {
   }
 }
 
+// What libraries say in a scene's words reads as flags at the terminal.
+TEST(SceneFields, KeysInBackquotesBecomeFlags) {
+  EXPECT_EQ(with_flags("a longer `step` or `soft_bones`"), "a longer --step or --soft-bones");
+  EXPECT_EQ(with_flags("`no_key` and a lone ` stay"), "`no_key` and a lone ` stay");
+  EXPECT_EQ(with_flags(""), "");
+}
+
 }  // namespace
 }  // namespace sinew::tools

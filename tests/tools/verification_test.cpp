@@ -13,6 +13,7 @@
 #include "tests/fem/bar.h"
 #include "tests/publish.h"
 #include "tests/tools/scene_body.h"
+#include "tools/session/run_settings.h"
 
 namespace sinew::tools {
 namespace {

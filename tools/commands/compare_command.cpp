@@ -12,8 +12,8 @@
 #include "tools/commands/command.h"
 #include "tools/ladder/comparison.h"
 #include "tools/ladder/tolerance.h"
-#include "tools/support/exit_code.h"
-#include "tools/support/failure.h"
+#include "tools/support/text.h"
+#include "tools/terminal/exit_code.h"
 
 namespace sinew::tools {
 namespace {

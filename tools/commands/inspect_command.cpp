@@ -16,10 +16,11 @@
 #include "assets/lattice_input.h"
 #include "lattice/build.h"
 #include "tools/commands/command.h"
+#include "tools/scene/scene_fields.h"
 #include "tools/session/roles.h"
 #include "tools/session/thin_limbs.h"
-#include "tools/support/exit_code.h"
-#include "tools/support/failure.h"
+#include "tools/support/text.h"
+#include "tools/terminal/exit_code.h"
 
 namespace sinew::tools {
 namespace {
@@ -273,9 +274,10 @@ std::string bones_text(const Inspection& inspection) {
 std::string findings_text(const assets::Rig& rig) {
   std::string text = "\nFindings\n";
   for (const Finding& finding : rig.findings) {
-    text += fmt::format("  {:<7}  {}{}: {}\n", word(finding.severity), finding.code,
-                        finding.where.empty() ? "" : " ('" + finding.where + "')", finding.message);
-    if (!finding.remedy.empty()) text += fmt::format("           -> {}\n", finding.remedy);
+    text +=
+        fmt::format("  {:<7}  {}{}: {}\n", word(finding.severity), finding.code,
+                    finding.where.empty() ? "" : " ('" + finding.where + "')", with_flags(finding.message));
+    if (!finding.remedy.empty()) text += fmt::format("           -> {}\n", with_flags(finding.remedy));
   }
   if (rig.findings.empty()) text += "  none\n";
   return text;
@@ -354,8 +356,8 @@ std::string inspection_json(const Inspection& inspection) {
     findings.push_back({{"severity", word(finding.severity)},
                         {"code", finding.code},
                         {"where", finding.where},
-                        {"message", finding.message},
-                        {"remedy", finding.remedy}});
+                        {"message", with_flags(finding.message)},
+                        {"remedy", with_flags(finding.remedy)}});
   }
   ordered_json document{{"file", single_line(rig.file)},
                         {"format", rig.format},
@@ -403,7 +405,7 @@ void add_inspect_command(CLI::App& app, CommandContext& context) {
     std::cout << (arguments->json ? inspection_json(inspection) : inspection_text(inspection));
     if (inspection.usable) return;
     std::cout.flush();
-    std::fprintf(stderr, "sinew: %s\n", single_line(refusal(inspection.rig)).c_str());
+    std::fprintf(stderr, "sinew: %s\n", single_line(with_flags(refusal(inspection.rig))).c_str());
     context.exit_code = exit_code::kInput;
   });
 }

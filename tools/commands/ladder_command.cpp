@@ -16,8 +16,8 @@
 #include "tools/ladder/ladder_report.h"
 #include "tools/ladder/tolerance.h"
 #include "tools/scene/scene_fields.h"
-#include "tools/support/exit_code.h"
-#include "tools/support/failure.h"
+#include "tools/terminal/caller.h"
+#include "tools/terminal/exit_code.h"
 
 namespace sinew::tools {
 namespace {
@@ -140,8 +140,7 @@ int run_ladder_command(const LadderRequest& request) {
     throw assets::ConfigError(fmt::format(
         "--converged: got '{}', expected a percentage of the height; hint: 0.5%", request.converged));
   for (const std::string& warning : outside_envelope(scene)) std::cerr << "warning: " << warning << '\n';
-  const Ladder ladder = run_ladder(scene, grid, converged.value, request.output,
-                                   [](const std::string& line) { std::cerr << line << '\n'; });
+  const Ladder ladder = run_ladder(scene, grid, converged.value, request.output, terminal_caller());
   const std::string settings = print_scene(scene);
   const std::string json = ladder_json(ladder, settings);
   const auto out = [&](const char* name) { return (fs::path(request.output) / name).string(); };

@@ -20,13 +20,17 @@
 #include "assets/rig.h"
 #include "tools/commands/command.h"
 #include "tools/commands/scene_flags.h"
+#include "tools/scene/scene_fields.h"
 #include "tools/session/body_fields.h"
 #include "tools/session/character.h"
+#include "tools/session/flesh_settings.h"
 #include "tools/session/lattice_memory.h"
+#include "tools/session/lattice_settings.h"
 #include "tools/session/roles.h"
 #include "tools/session/thin_limbs.h"
-#include "tools/support/failure.h"
-#include "tools/support/interrupt.h"
+#include "tools/support/errors.h"
+#include "tools/support/text.h"
+#include "tools/terminal/caller.h"
 
 namespace sinew::tools {
 namespace {
@@ -183,12 +187,12 @@ std::string lattice_report(const lattice::BuildResult& result, const lattice::Jo
 
 namespace {
 
-void say(const std::string& line) { fmt::print(stderr, "{}\n", single_line(line)); }
+void say(const std::string& line) { fmt::print(stderr, "{}\n", with_flags(single_line(line))); }
 
 /// The user's lattice, or one that is built or found in the cache.
 assets::CachedBuild make_lattice(const Scene& scene, const assets::Rig& rig,
-                                 const assets::LatticeInput& input) {
-  lattice::BuildOptions options = build_options(scene, input.joints.names);
+                                 const assets::LatticeInput& input, const Caller& caller) {
+  lattice::BuildOptions options = build_options(scene, input.joints.names, caller);
   hang_idle_sizes(input, say, options);
   assets::CachedBuild built;
   if (!scene.lattice.empty()) {
@@ -242,7 +246,7 @@ assets::LatticeFields fields_to_see(const Scene& scene, Character& character) {
 }
 
 /// The picture first: the lattice under its name means that all is done.
-void write_outputs(const LatticeRequest& request, Character& character) {
+void write_outputs(const LatticeRequest& request, Character& character, const Caller& caller) {
   const Scene& scene = request.scene;
   const lattice::ControlLattice& lattice = character.lattice.lattice;
   const bool has_picture = scene.preview == Switch::On;
@@ -254,9 +258,9 @@ void write_outputs(const LatticeRequest& request, Character& character) {
     assets::LatticePictureOptions picture;
     picture.caption = fmt::format("{}: lattice of {} cells", std::filesystem::path(scene.rig).stem().string(),
                                   lattice.complex.cells.size());
-    stop_if_interrupted("before drawing the lattice");
+    caller.stop_if_asked("before drawing the lattice");
     const assets::Image image = assets::render_lattice(lattice, character.input.skin.surface, picture);
-    stop_if_interrupted("before writing the lattice");
+    caller.stop_if_asked("before writing the lattice");
     assets::write_file(picture_name(request), assets::png_bytes(image), overwrite);
   }
   try {
@@ -272,6 +276,7 @@ void write_outputs(const LatticeRequest& request, Character& character) {
 
 void run_lattice(const LatticeRequest& request) {
   check_request(request);
+  const Caller caller = terminal_caller();
   const Scene& scene = request.scene;
   const auto start = std::chrono::steady_clock::now();
   assets::LoadOptions load;
@@ -279,15 +284,15 @@ void run_lattice(const LatticeRequest& request) {
   Character character;
   character.rig = assets::load_rig(scene.rig, load);
   character.clip = clip_of(scene, character.rig);
-  settle_roles(scene, character.rig, [](const std::string& line) { std::cerr << line << '\n'; });
+  settle_roles(scene, character.rig, caller.words());
   character.input = assets::lattice_input(character.rig);
   const lattice::JointTree& joints = character.input.joints;
-  stop_if_interrupted("before building the lattice");
-  if (scene.lattice.empty()) check_lattice_memory(scene, character.input.skin.surface);
-  assets::CachedBuild built = make_lattice(scene, character.rig, character.input);
+  caller.stop_if_asked("before building the lattice");
+  if (scene.lattice.empty()) check_lattice_memory(scene, character.input.skin.surface, say);
+  assets::CachedBuild built = make_lattice(scene, character.rig, character.input, caller);
   character.lattice = std::move(built.result);
-  stop_if_interrupted("after building the lattice");
-  write_outputs(request, character);
+  caller.stop_if_asked("after building the lattice");
+  write_outputs(request, character, caller);
   if (built.use == assets::CacheUse::Built)
     assets::keep_lattice(assets::cache_folder(scene.output), built.key, character.lattice, joints);
   if (scene.json) std::cout << lattice_report(character.lattice, joints);

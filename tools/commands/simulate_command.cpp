@@ -1,11 +1,13 @@
 #include <iostream>
 #include <memory>
+#include <string>
 
 #include <CLI/CLI.hpp>
 
 #include "tools/commands/command.h"
 #include "tools/commands/simulate_options.h"
 #include "tools/session/simulate.h"
+#include "tools/terminal/caller.h"
 
 namespace sinew::tools {
 
@@ -19,7 +21,8 @@ void add_simulate_command(CLI::App& app, CommandContext& context) {
     if (options->print_scene_only()) {
       std::cout << print_scene(scene);
     } else {
-      simulate(scene, [](const std::string& line) { std::cerr << line << '\n'; });
+      const std::string report = simulate(scene, terminal_caller());
+      if (scene.json) std::cout << report;
     }
     context.exit_code = 0;
   });

@@ -20,9 +20,8 @@
 #include "tools/scene/scene_fields.h"
 #include "tools/session/run_report.h"
 #include "tools/session/simulate.h"
-#include "tools/support/failure.h"
-#include "tools/support/interrupt.h"
-#include "tools/support/progress.h"
+#include "tools/support/errors.h"
+#include "tools/support/text.h"
 
 namespace sinew::tools {
 namespace {
@@ -103,13 +102,15 @@ LadderRun planned_run(const Scene& scene, const std::string& folder) {
   return run;
 }
 
-void do_run(const Scene& scene, LadderRun& run) {
+void do_run(const Scene& scene, LadderRun& run, const Caller& caller) {
   if (run.reused && fs::exists(failure_file(run))) run.failure = read_file(failure_file(run));
   if (!run.reused) {
     Scene with_output = scene;
     with_output.output = run.folder;
     try {
-      simulate(with_output, [](const std::string&) {});
+      Caller quiet = caller;
+      quiet.talk = {};
+      simulate(with_output, quiet);
     } catch (const NumericalError& error) {
       // The same settings fail again: so the ladder keeps this answer as it keeps others.
       run.failure = error.what();
@@ -128,20 +129,21 @@ std::string outcome(const LadderRun& run) {
       run.reused ? " (was there)" : "");
 }
 
-void do_runs(const Scene& scene, std::vector<LadderRun>& runs, const Talk& talk) {
+void do_runs(const Scene& scene, std::vector<LadderRun>& runs, const Caller& caller) {
+  const Talk talk = caller.words();
   const auto missing =
       std::count_if(runs.begin(), runs.end(), [](const LadderRun& run) { return !run.reused; });
   LadderClock clock({});
   if (missing > 0) {
-    LadderEstimate estimate = estimate_ladder(scene, runs);
+    LadderEstimate estimate = estimate_ladder(scene, runs, caller);
     clock = std::move(estimate.clock);
     talk(estimate_line(clock, static_cast<std::size_t>(missing), estimate.all_timed));
   }
   for (std::size_t k = 0; k < runs.size(); ++k) {
     LadderRun& run = runs[k];
-    stop_if_interrupted(fmt::format("after {} runs of the ladder; the same command goes on", k));
+    caller.stop_if_asked(fmt::format("after {} runs of the ladder; the same command goes on", k));
     const auto start = std::chrono::steady_clock::now();
-    do_run(scene_of_run(scene, run.rung, run.level, run.step), run);
+    do_run(scene_of_run(scene, run.rung, run.level, run.step), run, caller);
     std::string line = fmt::format("[{}/{}] {}", k + 1, runs.size(), outcome(run));
     if (!run.reused) {
       clock.finish(k, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -245,7 +247,7 @@ std::string settings_hash(const Scene& scene) {
 }
 
 Ladder run_ladder(const Scene& scene, const LadderGrid& grid, double limit, const std::string& folder,
-                  const Talk& talk) {
+                  const Caller& caller) {
   Ladder ladder;
   ladder.limit = limit;
   settings_hash(scene);  // names a file that cannot be read before anything is written
@@ -257,7 +259,7 @@ Ladder run_ladder(const Scene& scene, const LadderGrid& grid, double limit, cons
         ladder.runs.push_back(planned_run(scene_of_run(scene, rung, level, step), runs));
     }
   }
-  do_runs(scene, ladder.runs, talk);
+  do_runs(scene, ladder.runs, caller);
   ladder.reference = find_reference(ladder.runs);
   if (ladder.reference < 0)
     throw NumericalError("no run of the ladder worked; the first: " + ladder.runs.front().failure);

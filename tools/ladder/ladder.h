@@ -73,6 +73,6 @@ std::string settings_hash(const Scene& scene);
 /// it. A run that fails numerically is part of the answer; other failures are thrown. Throws NumericalError
 /// where no run worked.
 Ladder run_ladder(const Scene& scene, const LadderGrid& grid, double limit, const std::string& folder,
-                  const Talk& talk);
+                  const Caller& caller);
 
 }  // namespace sinew::tools

@@ -13,8 +13,8 @@
 
 #include "assets/lattice_cache.h"
 #include "fem/models/model.h"
-#include "tools/support/interrupt.h"
-#include "tools/support/progress.h"
+#include "tools/session/run_settings.h"
+#include "tools/support/text.h"
 
 namespace sinew::tools {
 namespace {
@@ -40,8 +40,9 @@ struct Level {
   double seconds = 0.0;  ///< to load and assemble it, without building the lattice [s].
 };
 
-std::unique_ptr<Level> make_level(const Scene& scene) {
-  const Talk quiet = [](const std::string&) {};
+std::unique_ptr<Level> make_level(const Scene& scene, const Caller& caller) {
+  Caller quiet = caller;
+  quiet.talk = {};
   Character character = make_character(scene, quiet);
   // The runs take it from there.
   if (!character.new_lattice_key.empty())
@@ -80,13 +81,13 @@ fem::Motion motion_of(const Character& character) {
 
 /// How long flesh takes to settle [s]: by the cheapest model of elements, as all of them take the same; the
 /// scene's limit where that would take long to say.
-double settling_time(const Scene& scene, const Level& level, double first) {
+double settling_time(const Scene& scene, const Level& level, double first, const Caller& caller) {
   fem::SimulationOptions options = simulation_options(scene, level.character, level.body);
   options.model = fem::kDefaultModel;
   options.integrator = fem::Integrator::Bdf2;
   const Stopwatch watch;
   fem::Simulation simulation(level.body, motion_of(level.character), first, options,
-                             [&] { return interrupt_signal() != 0 || watch.seconds() > kLongestTrial; });
+                             [&] { return caller.wants_to_stop() || watch.seconds() > kLongestTrial; });
   const fem::SimulationReport report = simulation.settle();
   return report.status == fem::SimulationStatus::Ok ? report.steps * options.step : options.settle_limit;
 }
@@ -119,7 +120,7 @@ RungCost try_rung(const Scene& scene, const Level& level, double time) {
 /// Every rung on every level that has runs to come, from coarse to fine.
 class Trials {
  public:
-  Trials(const Scene& scene, const std::vector<LadderRun>& runs) {
+  Trials(const Scene& scene, const std::vector<LadderRun>& runs, const Caller& caller) : caller_(caller) {
     for (const LadderRun& run : runs) {
       if (run.reused) continue;
       Scene first = scene_of_run(scene, run.rung, run.level, run.step);
@@ -131,23 +132,22 @@ class Trials {
   void run() {
     int total = 0;
     for (const auto& [number, rungs] : levels_) total += static_cast<int>(rungs.size());
-    Progress progress("estimating", total);
     for (const auto& [number, rungs] : levels_) {
       // The next level has eight times the cells.
       const bool may_try = last_ == nullptr || 8.0 * last_->seconds < kLongestAssembly;
       if (may_try) {
         last_.reset();
-        last_ = make_level(rungs.begin()->second);
+        last_ = make_level(rungs.begin()->second, caller_);
       }
       vertices_ = last_->body.mesh.num_vertices() * std::pow(8.0, may_try ? 0 : number - last_level_);
       if (may_try) last_level_ = number;
       if (!settling_) {
         times_ = times_of(rungs.begin()->second, last_->character);
-        settling_ = settling_time(rungs.begin()->second, *last_, times_.first);
+        settling_ = settling_time(rungs.begin()->second, *last_, times_.first, caller_);
       }
       for (const auto& [rung, run] : rungs) {
         try_or_scale(number, rung, run, may_try);
-        progress.update(static_cast<int>(costs_.size()));
+        caller_.report("estimating", static_cast<int>(costs_.size()), total);
       }
     }
   }
@@ -161,7 +161,7 @@ class Trials {
 
  private:
   void try_or_scale(int level, const std::string& rung, const Scene& run, bool may_try) {
-    stop_if_interrupted("while the ladder was estimated");
+    caller_.stop_if_asked("while the ladder was estimated");
     RungCost& cost = costs_[{level, rung}];
     const auto coarser = coarser_.find(rung);
     if (coarser != coarser_.end()) cost = coarser->second.scaled_to(vertices_);
@@ -177,6 +177,7 @@ class Trials {
     return cost.of_run((settling + times_.span) / step, times_.frames);
   }
 
+  const Caller& caller_;
   std::map<int, std::map<std::string, Scene>> levels_;  ///< the first run of every rung.
   std::map<std::pair<int, std::string>, RungCost> costs_;
   std::map<std::string, RungCost> coarser_;
@@ -240,12 +241,12 @@ std::string estimate_line(const LadderClock& clock, std::size_t num_runs, bool a
   return line;
 }
 
-LadderEstimate estimate_ladder(const Scene& scene, const std::vector<LadderRun>& runs) {
+LadderEstimate estimate_ladder(const Scene& scene, const std::vector<LadderRun>& runs, const Caller& caller) {
   std::unique_ptr<tbb::global_control> threads;
   if (scene.threads > 0)
     threads = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                     static_cast<std::size_t>(scene.threads));
-  Trials trials(scene, runs);
+  Trials trials(scene, runs, caller);
   trials.run();
   std::vector<ExpectedRun> expected;
   for (const LadderRun& run : runs)

@@ -63,7 +63,7 @@ struct LadderEstimate {
 
 /// Times a few steps of every rung on every level of the runs that are not there yet, in the middle of the
 /// motion; what would take long is scaled from a coarser level. Keeps the lattice in the runs' cache. Throws
-/// what make_character throws, and Interrupted.
-LadderEstimate estimate_ladder(const Scene& scene, const std::vector<LadderRun>& runs);
+/// what make_character throws.
+LadderEstimate estimate_ladder(const Scene& scene, const std::vector<LadderRun>& runs, const Caller& caller);
 
 }  // namespace sinew::tools

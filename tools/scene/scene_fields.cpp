@@ -310,6 +310,20 @@ std::string flag_name(const SceneField& field) {
   return name;
 }
 
+std::string with_flags(std::string_view text) {
+  std::string result;
+  while (!text.empty()) {
+    const std::size_t open = text.find('`');
+    const std::size_t close = open == text.npos ? text.npos : text.find('`', open + 1);
+    if (close == text.npos) break;
+    const SceneField* field = find_scene_field(text.substr(open + 1, close - open - 1));
+    result.append(text.substr(0, open));
+    result += field == nullptr ? std::string(text.substr(open, close + 1 - open)) : flag_name(*field);
+    text.remove_prefix(close + 1);
+  }
+  return result.append(text);
+}
+
 std::string help_text(const SceneField& field) {
   if (std::holds_alternative<ModelMember>(field.member))
     return fmt::format("{}: {}", field.help, fmt::join(model_names(), ", "));

@@ -74,6 +74,10 @@ const SceneField* find_scene_field(std::string_view key);
 /// "damping_frequency" -> "--damping-frequency".
 std::string flag_name(const SceneField& field);
 
+/// The text with every `key` of a scene in backquotes, as the libraries write it, as its flag: `soft_bones`
+/// becomes --soft-bones. Other words in backquotes stay.
+std::string with_flags(std::string_view text);
+
 /// For --help and the comment in a printed scene: what it is, the names or the range allowed.
 std::string help_text(const SceneField& field);
 

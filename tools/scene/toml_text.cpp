@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "assets/error.h"
-#include "tools/support/failure.h"
+#include "tools/support/text.h"
 
 namespace sinew::tools {
 

@@ -53,7 +53,7 @@ double estimated_cells(const lattice::Surface& skin, double edge) {
   return per_volume * (std::abs(volume) + kLayer * edge * area);
 }
 
-void check_lattice_memory(const Scene& scene, const lattice::Surface& skin) {
+void check_lattice_memory(const Scene& scene, const lattice::Surface& skin, const Talk& talk) {
   constexpr double kWorthSaying = 10'000;
   const double cells = scene.cell_size ? estimated_cells(skin, *scene.cell_size) : scene.cells;
   const double most = find_scene_field("cells")->range.max;
@@ -74,7 +74,7 @@ void check_lattice_memory(const Scene& scene, const lattice::Surface& skin) {
                     "1000 cells suffice for most characters",
                     asked, 1e-9 * estimate, most));
   if (cells >= kWorthSaying)
-    fmt::print(stderr, "about {:.2g} GB of memory for {:.0f} cells\n", 1e-9 * estimate, cells);
+    talk(fmt::format("about {:.2g} GB of memory for {:.0f} cells", 1e-9 * estimate, cells));
 }
 
 }  // namespace sinew::tools

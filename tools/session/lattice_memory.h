@@ -2,6 +2,7 @@
 
 #include "assets/lattice_input.h"
 #include "tools/scene/scene.h"
+#include "tools/support/caller.h"
 
 namespace sinew::tools {
 
@@ -14,6 +15,6 @@ inline constexpr int kMostPaintedCells = 50'000;
 
 /// States what a large lattice will take of memory, and throws assets::LimitError for what there is no room
 /// for or no scene may ask for: by the number of cells or by their size, whichever the scene gives.
-void check_lattice_memory(const Scene& scene, const lattice::Surface& skin);
+void check_lattice_memory(const Scene& scene, const lattice::Surface& skin, const Talk& talk);
 
 }  // namespace sinew::tools

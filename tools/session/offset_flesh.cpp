@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "tools/support/failure.h"
+#include "tools/support/errors.h"
 
 namespace sinew::tools {
 

@@ -4,24 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "fem/report/measures.h"
-#include "fem/skin/skin_guard.h"
 #include "fem/time/simulation.h"
 #include "tools/session/character.h"
+#include "tools/session/frame.h"
 #include "tools/session/skin_report.h"
 
 /// report.json: what a run did and what it found.
 namespace sinew::tools {
-
-/// One output frame.
-struct FrameReport {
-  int frame = 0;
-  double time = 0.0;  ///< of the clip [s].
-  int steps = 0;      ///< taken since the frame before.
-  fem::Measures measures;
-  fem::Mended mended;                  ///< of the skin; lengths [m].
-  std::optional<fem::SkinFrame> skin;  ///< empty for a plain scene, which nobody skins.
-};
 
 /// The phase of judging the skin, which is no part of making it.
 inline constexpr const char* kJudging = "judge the skin";

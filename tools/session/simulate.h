@@ -1,13 +1,14 @@
 #pragma once
 
+#include <string>
+
 #include "tools/scene/scene.h"
-#include "tools/session/character.h"
+#include "tools/support/caller.h"
 
 namespace sinew::tools {
 
-/// Runs a checked scene and writes its output folder; what `sinew simulate` does after its flags are read.
-/// Prints the report on stdout where the scene asks for JSON. Throws the errors of assets/error.h,
-/// NumericalError, Interrupted.
-void simulate(const Scene& scene, const Talk& talk);
+/// Runs a checked scene and writes its output folder; gives back the report as it stands in report.json.
+/// Throws the errors of assets/error.h, NumericalError and Stopped; then nothing is written.
+std::string simulate(const Scene& scene, const Caller& caller);
 
 }  // namespace sinew::tools

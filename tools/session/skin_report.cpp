@@ -9,7 +9,7 @@
 
 #include "fem/body/limb_radius.h"
 #include "tools/session/whole_skin.h"
-#include "tools/support/failure.h"
+#include "tools/support/errors.h"
 
 namespace sinew::tools {
 namespace {

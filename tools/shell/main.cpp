@@ -3,8 +3,8 @@
 #include <exception>
 
 #include "tools/shell/run.h"
-#include "tools/support/exit_code.h"
-#include "tools/support/interrupt.h"
+#include "tools/terminal/exit_code.h"
+#include "tools/terminal/interrupt.h"
 
 int main(int argc, char** argv) {
   // What no handler can catch any more (an exception in a destructor or a foreign thread) still ends with one

@@ -13,9 +13,9 @@
 
 #include "assets/error.h"
 #include "tools/commands/command.h"
-#include "tools/support/exit_code.h"
-#include "tools/support/failure.h"
 #include "tools/support/suggest.h"
+#include "tools/terminal/exit_code.h"
+#include "tools/terminal/failure.h"
 
 namespace sinew::tools {
 namespace {

@@ -1,6 +1,5 @@
-#include "tools/support/progress.h"
+#include "tools/terminal/progress.h"
 
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
@@ -10,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "tools/support/text.h"
+
 namespace sinew::tools {
 namespace {
 
@@ -17,13 +18,6 @@ constexpr std::chrono::milliseconds kTerminalInterval{100};
 constexpr std::chrono::seconds kLogInterval{10};
 
 }  // namespace
-
-std::string duration_text(double seconds) {
-  const long whole = std::lround(seconds);
-  if (whole < 60) return fmt::format("{} s", whole);
-  if (whole < 3600) return fmt::format("{} min {} s", whole / 60, whole % 60);
-  return fmt::format("{} h {} min", whole / 3600, whole % 3600 / 60);
-}
 
 std::string progress_line(const std::string& label, int done, int total, double seconds) {
   const double share = total > 0 ? static_cast<double>(done) / total : 1.0;

@@ -1,4 +1,4 @@
-#include "tools/support/interrupt.h"
+#include "tools/terminal/interrupt.h"
 
 #include <atomic>
 #include <mutex>
@@ -6,8 +6,6 @@
 
 #include <pthread.h>
 #include <signal.h>
-
-#include "tools/support/failure.h"
 
 namespace sinew::tools {
 namespace {
@@ -68,13 +66,6 @@ int interrupt_signal() {
   if (received_signal.load() == 0 && sigtimedwait(&terminate, nullptr, &at_once) == SIGTERM)
     remember_signal(SIGTERM);
   return received_signal.load();
-}
-
-void stop_if_interrupted(const std::string& where) {
-  const int signal = interrupt_signal();
-  if (signal == 0) return;
-  const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
-  throw Interrupted(signal, "stopped by " + name + (where.empty() ? "" : " " + where));
 }
 
 }  // namespace sinew::tools

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 /// Stopping on request: SIGINT and SIGTERM set a flag that long work polls.
 namespace sinew::tools {
 
@@ -13,8 +11,5 @@ void install_interrupt_handlers();
 
 /// The signal that asked to stop, or 0. Cheap; for any thread.
 int interrupt_signal();
-
-/// Throws Interrupted with "stopped by SIGINT <where>" when a signal came; to be called between steps.
-void stop_if_interrupted(const std::string& where);
 
 }  // namespace sinew::tools

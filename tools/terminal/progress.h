@@ -33,9 +33,6 @@ class Progress {
   Clock::time_point last_print_;
 };
 
-/// "45 s", "1 min 20 s", "2 h 5 min".
-std::string duration_text(double seconds);
-
 /// "hop: 40 %, 1 min 20 s left": the line for `done` of `total` after `seconds`; without an estimate while
 /// nothing is done.
 std::string progress_line(const std::string& label, int done, int total, double seconds);
