@@ -135,7 +135,7 @@ LeafMesh finish(const Hierarchy& hierarchy, const std::vector<CellRef>& refs,
 
 }  // namespace
 
-LeafMesh leaf_mesh(const Hierarchy& hierarchy, const ActiveSet& active) {
+LeafMesh leaf_mesh(const Hierarchy& hierarchy, const ActiveSet& active, std::span<const std::uint8_t> kept) {
   if (static_cast<int>(active.size()) != hierarchy.num_vertices()) {
     throw std::invalid_argument("leaf_mesh: the active set must have one flag per vertex of the hierarchy");
   }
@@ -144,7 +144,14 @@ LeafMesh leaf_mesh(const Hierarchy& hierarchy, const ActiveSet& active) {
       throw std::invalid_argument("leaf_mesh: a level-0 function is inactive; they must all be active");
     }
   }
-  return finish(hierarchy, find_leaf_cells(hierarchy, active), active);
+  if (!kept.empty() && kept.size() != hierarchy.coarse().cells.size())
+    throw std::invalid_argument("leaf_mesh: expected one flag per cell of level 0");
+  std::vector<CellRef> cells = find_leaf_cells(hierarchy, active);
+  if (!kept.empty())
+    std::erase_if(cells, [&](const CellRef& ref) {
+      return !kept[static_cast<std::size_t>(hierarchy.coarse_cell(ref.hex >> (3 * (ref.level - 1))))];
+    });
+  return finish(hierarchy, cells, active);
 }
 
 LeafMesh restrict_cells(const Hierarchy& hierarchy, const LeafMesh& mesh,
@@ -161,6 +168,25 @@ LeafMesh restrict_cells(const Hierarchy& hierarchy, const LeafMesh& mesh,
 int coarse_cell(const Hierarchy& hierarchy, const LeafMesh& mesh, int cell) {
   const auto c = static_cast<std::size_t>(cell);
   return hierarchy.coarse_cell(mesh.hex[c] >> (3 * (mesh.level[c] - 1)));
+}
+
+std::vector<int> containing_cells(const LeafMesh& fine, const LeafMesh& mesh) {
+  // Leaf cells stand in the order of their hexahedra, so those that lie in one follow each other.
+  std::vector<int> containing;
+  containing.reserve(fine.cells.size());
+  std::size_t leaf = 0;
+  const auto holds = [&](std::size_t c) {
+    if (leaf >= mesh.cells.size() || mesh.level[leaf] > fine.level[c]) return false;
+    return fine.hex[c] >> (3 * (fine.level[c] - mesh.level[leaf])) == mesh.hex[leaf];
+  };
+  for (std::size_t c = 0; c < fine.cells.size(); ++c) {
+    if (!holds(c) && c > 0) ++leaf;
+    if (!holds(c))
+      throw std::invalid_argument("leaf meshes: cell " + std::to_string(c) +
+                                  " lies in no cell of the other, expected two sets of one flesh");
+    containing.push_back(static_cast<int>(leaf));
+  }
+  return containing;
 }
 
 Points carried_values(const Hierarchy& hierarchy, const LeafMesh& from, const LeafMesh& to,

@@ -46,9 +46,16 @@ struct LeafMesh {
 /// The cell of level 0 from which a leaf cell comes.
 int coarse_cell(const Hierarchy& hierarchy, const LeafMesh& mesh, int cell);
 
+/// Per cell of `fine` the cell of `mesh` that it is or lies in. Both are leaf meshes of one hierarchy over
+/// the same cells of level 0, none of those of `mesh` finer than those of `fine`. Throws
+/// std::invalid_argument where a cell lies in none.
+std::vector<int> containing_cells(const LeafMesh& fine, const LeafMesh& mesh);
+
 /// Throws std::invalid_argument where a level-0 function is inactive (they are always needed: they carry
-/// affine motion) or the set has the wrong length.
-LeafMesh leaf_mesh(const Hierarchy& hierarchy, const ActiveSet& active);
+/// affine motion) or the set has the wrong length. `kept`: one flag per cell of level 0, those whose leaf
+/// cells are wanted; empty = all. What no kept cell touches stays out, as in restrict_cells.
+LeafMesh leaf_mesh(const Hierarchy& hierarchy, const ActiveSet& active,
+                   std::span<const std::uint8_t> kept = {});
 
 /// The part of a leaf mesh over the cells for which keep[cell] != 0, for instance without empty cells;
 /// vertices and functions that no kept cell touches leave as well. Level-0 functions of kept cells stay.

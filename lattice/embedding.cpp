@@ -139,6 +139,20 @@ void check_input(const LeafMesh& mesh, const Points& points) {
   }
 }
 
+/// Eight weights a row from cells and local coordinates.
+void set_weights(const LeafMesh& mesh, Embedding& embedding) {
+  std::vector<Eigen::Triplet<double>> triplets;
+  triplets.reserve(8 * embedding.cell.size());
+  for (std::size_t i = 0; i < embedding.cell.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const HexWeights weights = trilinear_weights(embedding.xi.row(row).transpose());
+    const HexVertices& cell = mesh.cells[static_cast<std::size_t>(embedding.cell[i])];
+    for (int k = 0; k < 8; ++k) triplets.emplace_back(row, cell[static_cast<std::size_t>(k)], weights[k]);
+  }
+  embedding.weights.resize(static_cast<Eigen::Index>(embedding.cell.size()), mesh.num_vertices());
+  embedding.weights.setFromTriplets(triplets.begin(), triplets.end());
+}
+
 }  // namespace
 
 Embedding embed(const LeafMesh& mesh, const Points& points, const CellFilter& may_hold) {
@@ -148,8 +162,6 @@ Embedding embed(const LeafMesh& mesh, const Points& points, const CellFilter& ma
   embedding.cell.assign(static_cast<std::size_t>(n), -1);
   embedding.xi.resize(n, 3);
   CellBins bins(mesh);
-  std::vector<Eigen::Triplet<double>> triplets;
-  triplets.reserve(8 * static_cast<std::size_t>(n));
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Vector3d p = points.row(i).transpose();
     const auto accept = [&](int cell) { return !may_hold || may_hold(static_cast<int>(i), cell); };
@@ -166,13 +178,29 @@ Embedding embed(const LeafMesh& mesh, const Points& points, const CellFilter& ma
     }
     embedding.cell[static_cast<std::size_t>(i)] = place.cell;
     embedding.xi.row(i) = place.local.xi.transpose();
-    const HexWeights weights = trilinear_weights(place.local.xi);
-    const HexVertices& cell = mesh.cells[static_cast<std::size_t>(place.cell)];
-    for (int k = 0; k < 8; ++k) triplets.emplace_back(i, cell[static_cast<std::size_t>(k)], weights[k]);
   }
-  embedding.weights.resize(n, mesh.num_vertices());
-  embedding.weights.setFromTriplets(triplets.begin(), triplets.end());
+  set_weights(mesh, embedding);
   return embedding;
+}
+
+Embedding carried_embedding(const LeafMesh& from, const Embedding& embedding, const LeafMesh& to,
+                            const std::vector<int>& leaf_of) {
+  Embedding carried;
+  carried.outside = embedding.outside;
+  carried.xi = embedding.xi;
+  carried.cell.reserve(embedding.cell.size());
+  for (std::size_t i = 0; i < embedding.cell.size(); ++i) {
+    const auto cell = static_cast<std::size_t>(embedding.cell[i]);
+    const int leaf = leaf_of[cell];
+    carried.cell.push_back(leaf);
+    int hex = from.hex[cell];
+    for (int level = from.level[cell]; level > to.level[static_cast<std::size_t>(leaf)]; --level, hex /= 8) {
+      const auto row = static_cast<Eigen::Index>(i);
+      carried.xi.row(row) = in_parent(hex % 8, carried.xi.row(row).transpose()).transpose();
+    }
+  }
+  set_weights(to, carried);
+  return carried;
 }
 
 }  // namespace sinew::lattice

@@ -30,4 +30,11 @@ using CellFilter = std::function<bool(int point, int cell)>;
 /// finite or the lattice has no cells.
 Embedding embed(const LeafMesh& mesh, const Points& points, const CellFilter& may_hold = {});
 
+/// The embedding of the same points in a leaf mesh `to` over the same cells of level 0, none of its cells
+/// finer than those of `from`. A cell's trilinear map is that of its children, so local coordinates change by
+/// an affine map and no point is looked for again: each stays in the cell that it was in, or in the one that
+/// is made of it. `leaf_of`: per cell of `from` the cell of `to` (containing_cells).
+Embedding carried_embedding(const LeafMesh& from, const Embedding& embedding, const LeafMesh& to,
+                            const std::vector<int>& leaf_of);
+
 }  // namespace sinew::lattice

@@ -43,6 +43,18 @@ std::span<const std::array<int, 3>> corner_neighbours(CellType type) {
                                        : kHexNeighbours;
 }
 
+Eigen::Vector3d in_parent(int child, const Eigen::Vector3d& xi) {
+  const auto corner = [](int k) {
+    const std::array<int, 3>& at = kCorners[static_cast<std::size_t>(k)];
+    return Eigen::Vector3d(at[0], at[1], at[2]);
+  };
+  const std::array<int, 3>& neighbours = kHexNeighbours[static_cast<std::size_t>(child)];
+  Eigen::Vector3d result = corner(child);
+  for (int d = 0; d < 3; ++d)
+    result += 0.5 * xi[d] * (corner(neighbours[static_cast<std::size_t>(d)]) - corner(child));
+  return result;
+}
+
 namespace {
 
 /// Local face of a cell type that holds corner `a` and its neighbours `b` and `c`.

@@ -67,6 +67,10 @@ class Hierarchy {
 /// The three neighbours of each corner, ordered so that the corner's hexahedron is positively oriented.
 std::span<const std::array<int, 3>> corner_neighbours(CellType type);
 
+/// Local coordinates in a hexahedron of the point that has `xi` in its child `child` (0 .. 7): the child's
+/// axes go from the hexahedron's corner along that corner's edges, and the trilinear map of both is the same.
+Eigen::Vector3d in_parent(int child, const Eigen::Vector3d& xi);
+
 /// Value transform, synthesis: overwrites the rows of inactive vertices (`is_active[v]` == 0) with the mean
 /// of their parents' rows, coarse to fine because a parent may itself be inactive. values: num_vertices x 3.
 void fill_inactive(const Hierarchy& hierarchy, std::span<const std::uint8_t> is_active, Points& values);

@@ -28,6 +28,35 @@ TEST(Embedding, ReproducesPointsInsideToRounding) {
   }
 }
 
+// A cell's map is that of its children, so that points are where they were with no search; cells that are not
+// coarser keep their bits.
+TEST(Embedding, IsCarriedToCoarserCellsExactly) {
+  std::mt19937_64 rng(14);
+  for (const auto& [name, complex] : tests::lattices_of_every_kind(0.1)) {
+    const Hierarchy hierarchy(complex, 3);
+    const LeafMesh fine = tests::uniform_mesh(hierarchy, 3);
+    ActiveSet active = uniform_active_set(hierarchy, 1, {});
+    for (int v = hierarchy.num_vertices(1); v < hierarchy.num_vertices(); ++v)
+      active[static_cast<std::size_t>(v)] = hierarchy.points()(v, 0) > (hierarchy.level(v) == 2 ? 0.9 : 1.5);
+    const LeafMesh mixed = leaf_mesh(hierarchy, active), coarse = tests::uniform_mesh(hierarchy, 1);
+    const Points at = tests::points_inside(fine, 300, rng);
+    const Embedding embedding = embed(fine, at);
+    for (const LeafMesh& mesh : {fine, mixed, coarse}) {
+      const std::vector<int> leaf_of = containing_cells(fine, mesh);
+      const Embedding carried = carried_embedding(fine, embedding, mesh, leaf_of);
+      EXPECT_LE((carried.weights * mesh.points - at).rowwise().norm().maxCoeff(), 1e-12) << name;
+      EXPECT_GE(carried.xi.minCoeff(), -1e-9);
+      EXPECT_LE(carried.xi.maxCoeff(), 1.0 + 1e-9);
+      for (std::size_t i = 0; i < carried.cell.size(); ++i) {
+        if (mesh.level[static_cast<std::size_t>(carried.cell[i])] < 3) continue;
+        EXPECT_EQ(carried.xi.row(static_cast<Eigen::Index>(i)),
+                  embedding.xi.row(static_cast<Eigen::Index>(i)));
+      }
+    }
+    EXPECT_THROW(containing_cells(coarse, fine), std::invalid_argument);
+  }
+}
+
 TEST(Embedding, GivesASharedFaceToTheCellWithTheSmallerIndex) {
   const Hierarchy hierarchy(box_lattice({{0, 0, 0}, {2, 1, 1}, {2, 1, 1}, CellType::Hexahedron, {}}), 1);
   const LeafMesh mesh = tests::uniform_mesh(hierarchy, 1);
