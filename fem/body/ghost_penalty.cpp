@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -55,20 +56,133 @@ struct FaceWeights {
 
 }  // namespace
 
+namespace {
+
+using Sides = std::map<std::array<int, 4>, std::vector<Side>>;  ///< by the vertices of the face, ascending.
+
+std::array<int, 4> face_key(const lattice::HexVertices& cell, std::size_t face) {
+  std::array<int, 4> key;
+  for (std::size_t k = 0; k < 4; ++k) key[k] = cell[static_cast<std::size_t>(kFaces[face][k])];
+  std::sort(key.begin(), key.end());
+  return key;
+}
+
+Sides sides_of_faces(const lattice::LeafMesh& mesh) {
+  Sides sides_of;
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c)
+    for (std::size_t f = 0; f < kFaces.size(); ++f)
+      sides_of[face_key(mesh.cells[c], f)].push_back({static_cast<int>(c), f});
+  return sides_of;
+}
+
+Eigen::Vector3d corner_point(int k) {
+  const auto& corner = lattice::kCorners[static_cast<std::size_t>(k)];
+  return {static_cast<double>(corner[0]), static_cast<double>(corner[1]), static_cast<double>(corner[2])};
+}
+
+/// The face `face` of a hexahedron whose corners are `vertices`, seen by cell `cell` of the mesh, on whose
+/// face it lies, or is: local coordinates there of `points`, given by those in the hexahedron.
+std::array<Eigen::Vector3d, 4> seen_by(const lattice::HexVertices& cell, const lattice::HexVertices& vertices,
+                                       std::size_t face, const std::array<Eigen::Vector3d, 4>& points) {
+  std::array<Eigen::Vector3d, 4> seen;
+  for (std::size_t p = 0; p < 4; ++p) {
+    const lattice::HexWeights weights = lattice::trilinear_weights(points[p]);
+    seen[p].setZero();
+    for (const int k : kFaces[face]) {
+      const auto at = std::find(cell.begin(), cell.end(), vertices[static_cast<std::size_t>(k)]);
+      seen[p] += weights[k] * corner_point(static_cast<int>(at - cell.begin()));
+    }
+  }
+  return seen;
+}
+
+/// Finds what lies across the faces of fine cells beside coarser ones, hexahedra of which a leaf mesh has the
+/// parts only.
+class CoarserFaces {
+ public:
+  explicit CoarserFaces(const lattice::LeafMesh& mesh) : mesh_(mesh) {
+    const auto [low, high] = std::minmax_element(mesh.level.begin(), mesh.level.end());
+    if (low == mesh.level.end()) return;
+    coarsest_ = *low;
+    finest_ = *high;
+    for (std::size_t c = 0; c < mesh.cells.size(); ++c) first_.push_back(place(mesh.level[c], mesh.hex[c]));
+  }
+
+  /// Adds the faces between `side` and coarser cells of `sides_of`. Counts: (int a, int b) -> bool.
+  template <class Counts>
+  void add(const Side& side, const Sides& sides_of, const Counts& counts,
+           std::vector<GhostFace>& faces) const {
+    const auto c = static_cast<std::size_t>(side.cell);
+    std::array<Eigen::Vector3d, 4> points;
+    for (std::size_t k = 0; k < 4; ++k) points[k] = corner_point(kFaces[side.face][k]);
+    std::size_t face = side.face;
+    double share = 1.0;
+    int hex = mesh_.hex[c];
+    for (int level = mesh_.level[c]; level > coarsest_; --level, hex /= 8) {
+      const std::optional<std::size_t> of_parent = parents_face(hex % 8, face);
+      if (!of_parent) return;
+      face = *of_parent;
+      share *= 0.25;
+      for (Eigen::Vector3d& point : points) point = lattice::in_parent(hex % 8, point);
+      const lattice::HexVertices parent = corners_of(level - 1, hex / 8);
+      const auto found = sides_of.find(face_key(parent, face));
+      if (found == sides_of.end()) continue;
+      for (const Side& other : found->second) {
+        if (!counts(side, other)) continue;
+        const lattice::HexVertices& cell = mesh_.cells[static_cast<std::size_t>(other.cell)];
+        faces.push_back(
+            {{side.cell, other.cell}, kFaces[side.face], seen_by(cell, parent, face, points), share});
+      }
+    }
+  }
+
+ private:
+  long place(int level, int hex) const { return static_cast<long>(hex) << (3 * (finest_ - level)); }
+
+  /// Corners of a hexahedron that is split, as leaf vertices: each is corner 0 of the child there, and of
+  /// that one's child, down to a leaf cell.
+  lattice::HexVertices corners_of(int level, int hex) const {
+    lattice::HexVertices corners;
+    for (int k = 0; k < 8; ++k) {
+      const auto leaf = std::lower_bound(first_.begin(), first_.end(), place(level + 1, 8 * hex + k));
+      corners[static_cast<std::size_t>(k)] = mesh_.cells[static_cast<std::size_t>(leaf - first_.begin())][0];
+    }
+    return corners;
+  }
+
+  /// The face of the parent on which face `face` of its child `child` lies; none where that is inside.
+  static std::optional<std::size_t> parents_face(int child, std::size_t face) {
+    const std::array<int, 3>& neighbours =
+        lattice::corner_neighbours(lattice::CellType::Hexahedron)[static_cast<std::size_t>(child)];
+    std::array<int, 3> on{child, -1, -1};  // three corners of the parent's face
+    std::size_t count = 1;
+    for (std::size_t d = 0; d < 3; ++d) {
+      constexpr std::array<int, 3> kAlong{1, 3, 4};  // corner of the child along axis d from its corner 0
+      if (std::find(kFaces[face].begin(), kFaces[face].end(), kAlong[d]) != kFaces[face].end() && count < 3)
+        on[count++] = neighbours[d];
+    }
+    if (std::find(kFaces[face].begin(), kFaces[face].end(), 0) == kFaces[face].end()) return std::nullopt;
+    for (std::size_t f = 0; f < kFaces.size(); ++f)
+      if (std::all_of(on.begin(), on.end(), [&](int k) {
+            return std::find(kFaces[f].begin(), kFaces[f].end(), k) != kFaces[f].end();
+          }))
+        return f;
+    return std::nullopt;
+  }
+
+  const lattice::LeafMesh& mesh_;
+  int coarsest_ = 1, finest_ = 1;
+  std::vector<long> first_;  ///< per leaf cell the finest hexahedron at its corner 0; ascending.
+};
+
+}  // namespace
+
 std::vector<GhostFace> ghost_faces(const lattice::LeafMesh& mesh,
                                    std::span<const lattice::FillFractions> fill,
                                    const GhostPenalty& penalty) {
   std::vector<GhostFace> faces;
   if (!(penalty.strength > 0.0)) return faces;
-  std::map<std::array<int, 4>, std::vector<Side>> sides_of;
-  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
-    for (std::size_t f = 0; f < kFaces.size(); ++f) {
-      std::array<int, 4> key;
-      for (std::size_t k = 0; k < 4; ++k) key[k] = mesh.cells[c][static_cast<std::size_t>(kFaces[f][k])];
-      std::sort(key.begin(), key.end());
-      sides_of[key].push_back({static_cast<int>(c), f});
-    }
-  }
+  const Sides sides_of = sides_of_faces(mesh);
   const auto is_slight = [&](int cell) {
     return mean_fill(fill[static_cast<std::size_t>(cell)]) < penalty.below;
   };
@@ -77,28 +191,30 @@ std::vector<GhostFace> ghost_faces(const lattice::LeafMesh& mesh,
         lattice::hex_corners(mesh.points, mesh.cells[static_cast<std::size_t>(side.cell)]);
     return area_vector(face_points(corners, kFaces[side.face]));
   };
+  const auto counts = [&](const Side& a, const Side& b) {
+    if (!is_slight(a.cell) && !is_slight(b.cell)) return false;
+    return outwards(a).dot(outwards(b)) < 0.0;  // else copies on the same side
+  };
+  const CoarserFaces coarser(mesh);
   for (const auto& [key, sides] : sides_of) {
     for (std::size_t i = 0; i < sides.size(); ++i) {
+      coarser.add(sides[i], sides_of, counts, faces);
       for (std::size_t j = i + 1; j < sides.size(); ++j) {
         const Side &a = sides[i], &b = sides[j];
-        if (!is_slight(a.cell) && !is_slight(b.cell)) continue;
-        if (outwards(a).dot(outwards(b)) >= 0.0) continue;  // copies on the same side
-        GhostFace face;
-        face.cell = {a.cell, b.cell};
-        const lattice::HexVertices &of_a = mesh.cells[static_cast<std::size_t>(a.cell)],
-                                   &of_b = mesh.cells[static_cast<std::size_t>(b.cell)];
-        face.corner[0] = kFaces[a.face];
-        for (std::size_t k = 0; k < 4; ++k) {
-          const int vertex = of_a[static_cast<std::size_t>(kFaces[a.face][k])];
-          face.corner[1][k] = static_cast<int>(std::find(of_b.begin(), of_b.end(), vertex) - of_b.begin());
-        }
-        faces.push_back(face);
+        if (!counts(a, b)) continue;
+        std::array<Eigen::Vector3d, 4> points;
+        for (std::size_t k = 0; k < 4; ++k) points[k] = corner_point(kFaces[a.face][k]);
+        faces.push_back({{a.cell, b.cell},
+                         kFaces[a.face],
+                         seen_by(mesh.cells[static_cast<std::size_t>(b.cell)],
+                                 mesh.cells[static_cast<std::size_t>(a.cell)], a.face, points),
+                         1.0});
       }
     }
   }
   // By cells, not by the vertices of the face: a fixed order that does not depend on the map's.
   std::sort(faces.begin(), faces.end(), [](const GhostFace& a, const GhostFace& b) {
-    return std::tie(a.cell, a.corner[0]) < std::tie(b.cell, b.corner[0]);
+    return std::tie(a.cell, a.corner) < std::tie(b.cell, b.corner);
   });
   return faces;
 }
@@ -125,8 +241,10 @@ GhostMatrix ghost_matrix(const lattice::LeafMesh& mesh, const GhostFace& face, d
                                      mesh.cells[static_cast<std::size_t>(face.cell[s])][k]) -
                     ghost.vertices.begin();
 
-  const FaceCorners points = face_points(corners[0], face.corner[0]);
-  const double h = 0.5 * (volume[0] + volume[1]) / area_vector(points).norm();
+  std::array<Eigen::Vector3d, 4> in_first;
+  for (std::size_t k = 0; k < 4; ++k) in_first[k] = corner_point(face.corner[k]);
+  const FaceCorners points = face_points(corners[0], face.corner);
+  const double h = 0.5 * (volume[0] + face.share * volume[1]) / area_vector(points).norm();
   const double low = 0.5 - 0.5 / std::sqrt(3.0), high = 1.0 - low;
   for (const auto& [u, v] : {std::pair(low, low), {high, low}, {high, high}, {low, high}}) {
     const FaceWeights weights(u, v);
@@ -138,10 +256,8 @@ GhostMatrix ghost_matrix(const lattice::LeafMesh& mesh, const GhostFace& face, d
     for (std::size_t s = 0; s < 2; ++s) {
       // Local coordinates are linear along a face: those of its corners, blended.
       Eigen::Vector3d xi = Eigen::Vector3d::Zero();
-      for (std::size_t k = 0; k < 4; ++k) {
-        const auto& corner = lattice::kCorners[static_cast<std::size_t>(face.corner[s][k])];
-        xi += weights.value[static_cast<Eigen::Index>(k)] * Eigen::Vector3d(corner[0], corner[1], corner[2]);
-      }
+      for (std::size_t k = 0; k < 4; ++k)
+        xi += weights.value[static_cast<Eigen::Index>(k)] * (s == 0 ? in_first : face.in_second)[k];
       const HexGradients gradients =
           lattice::trilinear_gradients(xi) * lattice::trilinear_jacobian(corners[s], xi).inverse();
       const Eigen::Matrix<double, 8, 1> along_normal = gradients * normal;

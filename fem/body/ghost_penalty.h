@@ -27,14 +27,19 @@ struct GhostPenalty {
   double below = 0.1;
 };
 
-/// A face of two leaf cells on which the penalty acts.
+/// A face of two leaf cells on which the penalty acts: the whole of it in the first cell; in the second,
+/// which may be coarser, perhaps only a part.
 struct GhostFace {
-  std::array<int, 2> cell{-1, -1};             ///< leaf cells.
-  std::array<std::array<int, 4>, 2> corner{};  ///< per cell the face's corners, in the same order [0 .. 7].
+  std::array<int, 2> cell{-1, -1};           ///< leaf cells.
+  std::array<int, 4> corner{};               ///< the face's corners among those of the first cell.
+  std::array<Eigen::Vector3d, 4> in_second;  ///< their local coordinates in the second cell.
+  double share = 1.0;                        ///< of the second cell's face that they span: 4^-levels.
 };
 
 /// The faces on which `penalty` acts; `fill`: one per leaf cell. Where a face belongs to more than two cells,
-/// as where copies of a cell join, every pair from its two sides counts.
+/// as where copies of a cell join, every pair from its two sides counts. Where levels meet, each of the finer
+/// cells has its part of the coarser one's face; of cells that come from one coarser one all must be in the
+/// mesh then.
 std::vector<GhostFace> ghost_faces(const lattice::LeafMesh& mesh,
                                    std::span<const lattice::FillFractions> fill, const GhostPenalty& penalty);
 

@@ -1,6 +1,7 @@
 #include "fem/body/ghost_penalty.h"
 
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -44,6 +45,52 @@ TEST(GhostPenalty, KinkBetweenTwoCubesCostsItsClosedForm) {
   const double energy = 0.5 * kink.cwiseProduct(apply_ghost(matrices, kink)).sum();
   // gamma mu h / 2 times the jump squared times the area: 0.01 x 1000 x 1 / 2 x (2 x 0.7)^2 x 4 m^2.
   EXPECT_NEAR(energy, 0.5 * 0.01 * 1000.0 * 1.0 * 1.96 * 4.0, 1e-9);
+}
+
+/// Level 1 and, where x > `from`, level 2.
+LeafMesh graded_mesh(const lattice::Hierarchy& hierarchy, double from) {
+  lattice::ActiveSet active = lattice::uniform_active_set(hierarchy, 1, {});
+  for (int v = hierarchy.num_vertices(1); v < hierarchy.num_vertices(2); ++v)
+    active[static_cast<std::size_t>(v)] = hierarchy.points()(v, 0) > from;
+  return lattice::leaf_mesh(hierarchy, active);
+}
+
+TEST(GhostPenalty, KinkBetweenLevelsCostsItsClosedForm) {
+  // Two blocks of 2 m: leaf cells of 1 m on the left and of half a metre on the right.
+  const lattice::BoxOptions box{{0, 0, 0}, {4, 2, 2}, {2, 1, 1}, lattice::CellType::Hexahedron, {}};
+  const lattice::Hierarchy hierarchy(lattice::box_lattice(box), 2);
+  const LeafMesh mesh = graded_mesh(hierarchy, 2.1);
+  ASSERT_EQ(mesh.cells.size(), 8u + 64u);
+  const std::vector<Material> materials(mesh.cells.size(), {2.9e3, 0.45, 1000.0});  // mu = 1000 Pa
+  Points kink = Points::Zero(mesh.num_vertices(), 3);
+  for (int a = 0; a < mesh.num_vertices(); ++a) kink(a, 1) = 0.7 * std::abs(mesh.points(a, 0) - 2.0);
+  for (const auto& [left, right] : {std::pair(1.0, 0.0), {0.0, 1.0}}) {
+    const LeafMatrices matrices = assemble(mesh, materials, fill_of(mesh, 2.0, left, right), {0.01, 0.3});
+    const double energy = 0.5 * kink.cwiseProduct(apply_ghost(matrices, kink)).sum();
+    // As above with h = (1 + 0.5) / 2, on sixteen faces that are a quarter of a coarse one.
+    EXPECT_NEAR(energy, 0.5 * 0.01 * 1000.0 * 0.75 * 1.96 * 4.0, 1e-9);
+  }
+}
+
+TEST(GhostPenalty, IsZeroForAffineMapsWhereLevelsMeet) {
+  std::mt19937_64 rng(20021);
+  for (const auto& [name, complex] : tests::lattices_of_every_kind(0.1)) {
+    const lattice::Hierarchy hierarchy(complex, 2);
+    const LeafMesh mesh = graded_mesh(hierarchy, 1.2);
+    const std::vector<FillFractions> empty(mesh.cells.size(), filled(0.0));
+    bool is_between_levels = false;
+    for (const GhostFace& face : ghost_faces(mesh, empty, {}))
+      is_between_levels |= mesh.level[static_cast<std::size_t>(face.cell[0])] !=
+                           mesh.level[static_cast<std::size_t>(face.cell[1])];
+    EXPECT_TRUE(is_between_levels) << name;
+    const LeafMatrices matrices =
+        assemble(mesh, std::vector<Material>(mesh.cells.size(), Material{2.9e3, 0.45, 1000.0}), empty);
+    const Points pulled = apply_ghost(matrices, tests::Affine(rng)(mesh.points));
+    double largest = 0.0;
+    for (const double s : matrices.ghost) largest = std::max(largest, std::abs(s));
+    // Sums of some ten products each way that cancel.
+    EXPECT_LE(pulled.cwiseAbs().maxCoeff(), 1e-12 * largest) << name;
+  }
 }
 
 /// Any lattice: its cells are distorted and filled at random.
