@@ -42,13 +42,38 @@ struct Tie {
   std::vector<Eigen::Vector3d> first;  ///< (P_b (X - C_b))_a [N].
 };
 
-/// Adds the ties' matrices to matrices.tie (P = sum_b P_b) and returns their targets. The tube's radius does
-/// not depend on the active level: at least smallest_radius, unless an override says it. Of cells that
-/// coincide only the one of the tie's own limb (`limbs`) is held, and of the tube what hangs together with
-/// the cells that hold the bone. A tie that reaches no flesh is left out.
-std::vector<Tie> add_ties(const lattice::ControlLattice& lattice, const FrameTree& tree,
-                          const LimbRadii& radii, const lattice::LeafMesh& mesh,
-                          const lattice::LeafLimbs& limbs, const std::vector<double>& mu_of_frame,
-                          double edge_length, const TieOptions& options, LeafMatrices& matrices);
+/// A tie before there are leaf cells: the tube, what it follows and how firmly.
+struct TieLaw {
+  int frame = -1;                                ///< frame index whose T it follows.
+  int joint = -1;                                ///< of the frame, as the lattice names it.
+  int bone = -1;                                 ///< of the lattice; -1 for a soft frame.
+  Eigen::Vector3d start{0, 0, 0}, end{0, 0, 0};  ///< the tube's axis at rest [m]; a ball where they agree.
+  double radius = 0.0;                           ///< r [m].
+  double kappa = 0.0;                            ///< [N/m^4].
+  /// Leaf cells of the finest mesh that hold the axis itself, ascending.
+  std::vector<int> holders;
+};
+
+/// The laws of all bones and soft frames. The tube's radius does not depend on the active set: at least
+/// smallest_radius, unless an override says it. Of cells that coincide only the one of the tie's own limb
+/// (`limbs`, of the leaf mesh `finest`) holds it.
+std::vector<TieLaw> tie_laws(const lattice::ControlLattice& lattice, const FrameTree& tree,
+                             const LimbRadii& radii, const lattice::LeafMesh& finest,
+                             const lattice::LeafLimbs& limbs, const std::vector<double>& mu_of_frame,
+                             const TieOptions& options);
+
+/// Where the laws act: a leaf mesh and, of every cell of the finest mesh, the leaf cell that it lies in.
+struct TiedCells {
+  const lattice::Hierarchy& hierarchy;
+  const lattice::LeafMesh& mesh;
+  const std::vector<int>& leaf_of_finest;
+  const lattice::LimbCopies& copies;
+};
+
+/// Adds the ties' matrices to matrices.tie (P = sum_b P_b) and returns their targets. Of cells that coincide
+/// only the one of the tie's own limb is held, and of the tube what hangs together with the cells that hold
+/// its axis, as it does between cells of the coarsest level of the mesh. A tie that reaches no flesh is left
+/// out.
+std::vector<Tie> add_ties(const std::vector<TieLaw>& laws, const TiedCells& cells, LeafMatrices& matrices);
 
 }  // namespace sinew::fem

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <stdexcept>
 #include <vector>
 
@@ -11,7 +12,7 @@
 #include "fem/linear/factor.h"
 #include "lattice/box.h"
 
-/// A bar of box cells, made by hand: one region, no ties, full cells; its answers are known.
+/// A bar of box cells: plain flesh, one region, no ties, full cells; its answers are known.
 namespace sinew::tests {
 
 struct BarOptions {
@@ -38,80 +39,34 @@ inline fem::Damping rayleigh(double alpha, double beta) {
   return {std::sqrt(alpha * beta), std::sqrt(alpha / beta) / (2.0 * M_PI)};
 }
 
-inline fem::Body bar_body(const BarOptions& options) {
-  lattice::ControlLattice control;
-  control.complex = lattice::box_lattice(options.box);
-  for (Eigen::Index a = 0; options.distort && a < control.complex.points.rows(); ++a) {
-    control.complex.points.row(a) = options.distort(control.complex.points.row(a).transpose()).transpose();
+inline fem::Flesh bar_flesh(const BarOptions& options) {
+  fem::PlainFlesh plain;
+  plain.cells = lattice::box_lattice(options.box);
+  for (Eigen::Index a = 0; options.distort && a < plain.cells.points.rows(); ++a) {
+    plain.cells.points.row(a) = options.distort(plain.cells.points.row(a).transpose()).transpose();
   }
-  control.edge_length =
+  plain.edge_length =
       (options.box.max - options.box.min).cwiseQuotient(options.box.blocks.cast<double>()).maxCoeff();
-  lattice::Hierarchy hierarchy(control.complex, std::max(1, options.levels + (options.refine ? 1 : 0)));
-  lattice::ActiveSet active = lattice::uniform_active_set(hierarchy, options.levels, {});
-  if (options.refine) options.refine(hierarchy, active);
-  lattice::LeafMesh mesh = lattice::leaf_mesh(hierarchy, active);
-  std::vector<lattice::FillFractions> fill(mesh.cells.size());
-  for (std::size_t c = 0; c < fill.size(); ++c) {
-    const lattice::HexCorners corners = lattice::hex_corners(mesh.points, mesh.cells[c]);
-    for (int q = 0; q < 8; ++q) {
-      const Eigen::Vector3d x = corners.transpose() * lattice::trilinear_weights(fem::gauss_point(q));
-      fill[c][static_cast<std::size_t>(q)] = options.fill ? options.fill(x) : 1.0;
-    }
-  }
-  std::vector<fem::Material> materials(mesh.cells.size(), options.material);
-  fem::LeafMatrices matrices = fem::assemble(mesh, materials, fill, options.ghost);
-  const int n = mesh.num_vertices();
+  plain.levels = options.levels + (options.refine ? 1 : 0);
+  plain.frame.joint = 0;
+  plain.frame.direction_rest = {1, 0, 0};
+  plain.frame.length = options.box.max[0] - options.box.min[0];
+  plain.frame.name = "base";
+  plain.material = options.material;
+  plain.damping = options.damping;
+  plain.ghost = options.ghost;
+  plain.fill = options.fill;
+  plain.held = options.held;
+  if (!options.held && options.clamped)
+    plain.held = [x_min = options.box.min[0]](const Eigen::Vector3d& x) { return x[0] <= x_min + 1e-9; };
+  return fem::make_flesh(plain);
+}
 
-  fem::FrameTree tree;
-  fem::Frame frame;
-  frame.joint = 0;
-  frame.direction_rest = {1, 0, 0};
-  frame.length = options.box.max[0] - options.box.min[0];
-  frame.name = "base";
-  tree.frames = {frame};
-  tree.frame_of_joint = {0};
-  fem::BoneConstraints bones;
-  bones.is_bone.assign(static_cast<std::size_t>(n), 0);
-  for (int a = 0; a < n; ++a) {
-    const Eigen::Vector3d x = mesh.points.row(a).transpose();
-    const bool at_face = options.clamped && x[0] <= options.box.min[0] + 1e-9;
-    if (options.held ? !options.held(x) : !at_face) continue;
-    bones.is_bone[static_cast<std::size_t>(a)] = 1;
-    bones.vertices.push_back({a, 0, -1, 0, 0, x, x, 0.0});
-  }
-  fem::Region region{0, 0, 0.0, {0, 0, 0}, {}, {}};
-  fem::FrameWeights weights(n, 1);
-  for (int a = 0; a < n; ++a) {
-    weights.insert(a, 0) = 1.0;
-    region.vertices.push_back(a);
-    region.weights.push_back(1.0);
-  }
-  lattice::Embedding skin = lattice::embed(mesh, mesh.points);
-  fem::Body body{std::move(control),
-                 std::move(hierarchy),
-                 std::move(mesh),
-                 std::move(skin),
-                 std::move(fill),
-                 std::move(materials),
-                 std::move(matrices),
-                 std::move(tree),
-                 std::move(weights),
-                 std::move(bones),
-                 {},
-                 {std::move(region)},
-                 options.damping,
-                 false,
-                 {},
-                 {},
-                 0.0,
-                 0.0,
-                 {}};
-  body.skin_rows = body.skin.weights;
-  const lattice::Points sums = fem::apply_mass(body.matrices, lattice::Points::Ones(n, 3));
-  for (int a = 0; a < n; ++a) body.vertex_mass.push_back(sums(a, 0));
-  body.volume = sums.col(0).sum() / options.material.density;
-  body.size = (options.box.max - options.box.min).norm();
-  return body;
+inline fem::Body bar_body(const BarOptions& options) {
+  const auto flesh = std::make_shared<const fem::Flesh>(bar_flesh(options));
+  lattice::ActiveSet active = fem::uniform_set(*flesh, options.levels);
+  if (options.refine) options.refine(flesh->hierarchy, active);
+  return fem::make_body(flesh, active);
 }
 
 /// Leaf vertex at rest point x.
