@@ -160,7 +160,10 @@ fem::Body body_by(const Make& make, const Character& character, const fem::BodyO
 }  // namespace
 
 fem::Body make_body(const Character& character) {
-  return body_by(fem::make_body, character, character.body_options);
+  const auto make = [](const fem::BodyInput& input, const fem::BodyOptions& options) {
+    return fem::make_body(input, options);
+  };
+  return body_by(make, character, character.body_options);
 }
 
 fem::Body paint_body(const Character& character) {
