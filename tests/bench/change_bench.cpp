@@ -13,6 +13,7 @@
 #include <tbb/global_control.h>
 
 #include "tools/session/character.h"
+#include "tools/session/run_settings.h"
 
 namespace sinew {
 namespace {
@@ -65,7 +66,7 @@ void run() {
   const char* rig = std::getenv("SINEW_BENCH_RIG");
   scene.rig = rig != nullptr ? rig : SINEW_SOURCE_DIR "/assets/samples/hopper.glb";
   scene.levels = 2;
-  const tools::Character character = tools::make_character(scene, [](const std::string&) {});
+  const tools::Character character = tools::make_character(scene, {});
   double start = milliseconds();
   const fem::Body finest = tools::make_body(character);
   const double whole = milliseconds() - start;
