@@ -17,7 +17,8 @@ namespace {
 
 /// Rows of a CSV file of ../shared/reference, without its header.
 std::vector<std::vector<std::string>> reference_rows(const std::string& file) {
-  const std::string path = std::string(SINEW_SHARED_DIR) + "/reference/" + file;
+  std::string path = SINEW_SHARED_DIR "/reference/";
+  path += file;
   std::ifstream in(path);
   if (!in) throw std::runtime_error(path + ": cannot be read");
   std::vector<std::vector<std::string>> rows;
