@@ -1,9 +1,11 @@
 #include "tools/session/frame_maker.h"
 
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "assets/error.h"
 #include "tools/support/errors.h"
 
 namespace sinew::tools {
@@ -24,9 +26,17 @@ FrameMaker::FrameMaker(const Scene& scene, const Character& character, const Cal
   if (scene.offset.value_or(0.0) != 0.0) offset_.emplace(*scene.offset, character, simulation, options);
 }
 
+fem::SimulationReport FrameMaker::advance(int number, double time) {
+  try {
+    return simulation_.advance_to(time);
+  } catch (const std::invalid_argument& error) {  // the clip has a frame there that no flesh can follow
+    throw assets::InputError(character_.rig.file, fmt::format("frame {}: {}", number, error.what()));
+  }
+}
+
 Frame FrameMaker::step_to(int number) {
   const double time = character_.the_clip().start + number / scene_.fps;
-  const fem::SimulationReport step = simulation_.advance_to(time);
+  const fem::SimulationReport step = advance(number, time);
   if (step.status != fem::SimulationStatus::Ok)
     fail(character_, caller_, step, fmt::format("frame {}", number));
   Frame frame;

@@ -24,13 +24,15 @@ class FrameMaker {
              fem::Simulation& simulation, const fem::SimulationOptions& options, const FrameRange& frames);
 
   /// The next frame in order; nothing after the last. Runs ahead of it as far as the guard looks. Throws
-  /// NumericalError with frame and place where the flesh diverges or finds no balance, and Stopped.
+  /// NumericalError with frame and place where the flesh diverges or finds no balance, assets::InputError
+  /// where the clip squashes a frame flat, and Stopped.
   std::optional<Frame> next();
 
   /// Spent on judging so far [s].
   double judging_seconds() const { return judge_.seconds(); }
 
  private:
+  fem::SimulationReport advance(int number, double time);
   /// Steps to a frame; the guard has seen it and not mended it.
   Frame step_to(int number);
 
