@@ -1,5 +1,8 @@
 #include <array>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
 #include <string>
 
 #include "assets/detail/file_bytes.h"
@@ -48,7 +51,19 @@ void check_head(const std::string& file, const std::string& head) {
   }
 }
 
-std::string default_importer() { return detail::program_folder() + "sinew-import"; }
+/// Beside the program that runs; else, as in programs of others that link the library, on the PATH.
+std::string default_importer() {
+  const std::string name = "sinew-import", beside = detail::program_folder() + name;
+  std::error_code ignored;
+  if (std::filesystem::exists(beside, ignored)) return beside;
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "" : path);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const std::filesystem::path file = std::filesystem::path(folder) / name;
+    if (!folder.empty() && std::filesystem::exists(file, ignored)) return file.string();
+  }
+  return beside;
+}
 
 }  // namespace
 

@@ -293,7 +293,7 @@ TEST_F(AtomicOutput, SingleFilesFollowTheSameRules) {
   EXPECT_THAT(entries(), ElementsAre("a.vtu"));
   fs::create_directory(at("folder"));
   EXPECT_THROW(write_file(at("folder"), "x", Overwrite::Replace), IoError);
-  EXPECT_THROW(write_file(at("none/a.vtu"), "x", Overwrite::Refuse), IoError);
+  EXPECT_THROW(write_file(at("a.vtu/b.vtu"), "x", Overwrite::Refuse), IoError);
 }
 
 }  // namespace

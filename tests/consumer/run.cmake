@@ -15,6 +15,8 @@ run(${CMAKE_COMMAND} -S "${SOURCE_DIR}" -B "${WORK_DIR}/build" -G Ninja -DCMAKE_
     "-DCMAKE_CXX_COMPILER=${CXX_COMPILER}" "-DCMAKE_CXX_FLAGS=${CXX_FLAGS}"
     "-DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix")
 run(${CMAKE_COMMAND} --build "${WORK_DIR}/build")
+# Rigs are read by the installed importer, which is found on the PATH.
+set(ENV{PATH} "${WORK_DIR}/prefix/bin:$ENV{PATH}")
 run("${WORK_DIR}/build/consumer" "${SOURCE_DIR}/../../assets/samples/arm.glb")
 if(NOT output MATCHES "^frame 0: ([0-9]+) vertices, moved\nframe 1: [0-9]+ vertices, moved\n2 frames\n$")
   message(FATAL_ERROR "the consumer printed: ${output}")

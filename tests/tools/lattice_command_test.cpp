@@ -97,7 +97,7 @@ TEST_F(LatticeCommand, RefusesBadValuesWithOneLineAndNoFile) {
   const std::pair<const char*, std::pair<int, const char*>> cases[] = {
       {"-o arm.stl",
        {2, "sinew: arm.stl: extension, got '.stl', expected .vtu, .vtk, .msh, .mesh, .node, .ele or .veg\n"}},
-      {"-o a.msh --format vtk", {2, "sinew: --format: got 'vtk', which does not fit the extension '.msh'\n"}},
+      {"-o a.msh --format vtk", {2, "sinew: format: got 'vtk', which does not fit the extension '.msh'\n"}},
       {"-o a.msh --snap-tolerance 2",
        {2, "sinew: --snap-tolerance: got 2, expected 1e-12 <= tolerance <= 0.1; hint: 1e-4\n"}},
       {"-o a.vtu --cells 3", {2, "sinew: --cells: got 3, expected 20 <= cells <= 1000000; hint: 1000\n"}},
