@@ -69,6 +69,8 @@ inline constexpr double kCutJump = 1.0;
 
 /// A step is halved at most so often, for fast frames and for solves that fail.
 inline constexpr int kMostHalvings = 8;
+/// Steps that go well before a longer one is tried: what turned fast may go on to.
+inline constexpr int kStepsBetweenChanges = 10;
 
 class Simulation {
  public:
