@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <memory>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -147,6 +148,26 @@ TEST(Pc2Reader, SaysWhatIsWrongWithAFile) {
   std::filesystem::remove(file);
   EXPECT_THROW(Pc2Reader{file}, IoError);
   EXPECT_THAT([] { Pc2Reader{"/dev/zero"}; }, ThrowsMessage<IoError>(HasSubstr("not a regular file")));
+}
+
+// Every row of the table writes what it reads, by the extension in any case.
+TEST(PointCache, FormatsAreFoundByTheirExtension) {
+  for (const PointCacheFormat& format : point_cache_formats()) {
+    for (const std::string& extension : {std::string(format.extension), std::string(".PC2")}) {
+      const std::string file = tests::temporary_path("cache" + extension);
+      const std::unique_ptr<PointCacheWriter> writer = write_point_cache(file, 2, 7.0);
+      writer->write((lattice::Points(2, 3) << 1, 2, 3, 4, 5, 6).finished());
+      writer->finish();
+      const std::unique_ptr<PointCacheReader> reader = read_point_cache(file);
+      EXPECT_EQ(reader->num_samples(), 1);
+      EXPECT_EQ(reader->first_frame(), 7.0);
+      EXPECT_EQ(reader->read(0)(1, 2), 6.0f);
+    }
+  }
+  EXPECT_EQ(find_point_cache_format("a.txt"), nullptr);
+  EXPECT_THAT([] { write_point_cache("a.txt", 2); },
+              ThrowsMessage<ConfigError>(HasSubstr("expected one of .pc2")));
+  EXPECT_THAT([] { read_point_cache("a"); }, ThrowsMessage<InputError>(HasSubstr("expected one of .pc2")));
 }
 
 }  // namespace

@@ -6,11 +6,10 @@
 #include <fmt/format.h>
 
 #include "assets/error.h"
+#include "tools/session/whole_skin.h"
 #include "tools/support/errors.h"
 
 namespace sinew::tools {
-
-using lattice::Points;
 
 FrameMaker::FrameMaker(const Scene& scene, const Character& character, const Caller& caller,
                        fem::Simulation& simulation, const fem::SimulationOptions& options,
@@ -46,12 +45,8 @@ Frame FrameMaker::step_to(int number) {
   frame.report.measures = simulation_.measures_at(time);
   frame.pose = character_.pose(time);
   frame.skinned = assets::skin(character_.rig, frame.pose);
-  frame.positions = frame.skinned;
-  const Points surface = simulation_.skin_of(simulation_.positions_at(time));
-  const std::vector<int>& map = character_.input.skin.surface_of_vertex;
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    if (map[i] >= 0) frame.positions.row(static_cast<Eigen::Index>(i)) = surface.row(map[i]);
-  }
+  frame.positions =
+      with_flesh(character_.input.skin, frame.skinned, simulation_.skin_of(simulation_.positions_at(time)));
   if (offset_) {
     offset_->apply(time, frame.pose, frame.skinned, frame.positions);
   } else if (scene_.offset) {

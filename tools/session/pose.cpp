@@ -22,6 +22,7 @@
 #include "tools/session/run_settings.h"
 #include "tools/session/skin_json.h"
 #include "tools/session/skin_report.h"
+#include "tools/session/whole_skin.h"
 #include "tools/support/errors.h"
 
 namespace sinew::tools {
@@ -101,12 +102,7 @@ std::string pose_vtu(const fem::Body& body, const Points& x, const std::vector<f
 /// The whole skin: the flesh where it is, mended, and props on it; everything else as `skinned` has it.
 Points whole_skin(const Scene& scene, const Character& c, const fem::Body& body, const Points& x,
                   const std::vector<Eigen::Affine3d>& pose, const Points& skinned) {
-  const Points surface = body.skin_rows * x;
-  Points all = skinned;
-  const std::vector<int>& map = c.input.skin.surface_of_vertex;
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    if (map[i] >= 0) all.row(static_cast<Eigen::Index>(i)) = surface.row(map[i]);
-  }
+  Points all = with_flesh(c.input.skin, skinned, body.skin_rows * x);
   FrameGuard(scene, c).mend(skinned, all);
   assets::PropMotion(c.rig).place(pose, skinned, all);
   return all;

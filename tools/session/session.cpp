@@ -150,6 +150,7 @@ std::shared_ptr<void> limit_threads(int threads) {
 }  // namespace
 
 Session::Session(const Scene& scene, Caller caller) : scene_(scene), caller_(std::move(caller)) {
+  scene_.validate();
   threads_ = limit_threads(scene_.threads);
   character_ = make_character(scene_, caller_);
   frames_ = frame_range(scene_, character_, caller_.words());

@@ -22,8 +22,8 @@ namespace sinew::tools {
 ///     session.run({&sink, 1});
 class Session {
  public:
-  /// `scene` as read_scene or check_scene leave it: every value within its range. Throws the errors of
-  /// assets/error.h, NumericalError and Stopped (tools/support/errors.h).
+  /// Checks the scene (Scene::validate); its output is not looked at. Throws the errors of assets/error.h,
+  /// NumericalError and Stopped (tools/support/errors.h).
   explicit Session(const Scene& scene, Caller caller = {});
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;

@@ -64,6 +64,10 @@ std::string remedy(const Scene& scene, const Character& c, const fem::Body& body
                    SkinFault fault) {
   if (scene.guard == Switch::Off && fault != SkinFault::FarAway)
     return "--guard on, which lays torn skin back towards plain skinning";
+  // What is away before anything has moved sags or bends otherwise than the rig; only the first gets better
+  // by stiffer flesh.
+  if (fault == SkinFault::FarAway)
+    return "--offset 1, which starts at the rig's own shape and adds what the flesh moves";
   const double across = cells_across(c, body, vertex);
   const std::string stiffer = fmt::format("--young {:.2g}", much_stiffer(c));
   constexpr double kEnough = 0.5;

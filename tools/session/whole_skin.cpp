@@ -32,6 +32,15 @@ lattice::Triangles all_triangles(const assets::Rig& rig) {
   return all;
 }
 
+Points with_flesh(const assets::PhysicsSkin& skin, const Points& skinned, const Points& surface) {
+  Points all = skinned;
+  for (std::size_t i = 0; i < skin.surface_of_vertex.size(); ++i) {
+    const int at = skin.surface_of_vertex[i];
+    if (at >= 0) all.row(static_cast<Eigen::Index>(i)) = surface.row(at);
+  }
+  return all;
+}
+
 std::string place_of(const assets::Rig& rig, int vertex) {
   for (const assets::Part& part : rig.parts) {
     if (vertex >= part.points.rows()) {
