@@ -31,6 +31,11 @@ ROOMS = {
               "cmake"],
 }
 
+# Code that serves programs of others, too: it neither reads flags nor writes to a terminal.
+LIBRARY_ROOMS = {"support", "scene", "session", "ladder"}
+TERMINAL = re.compile(r"std::c(?:out|err)\b|\bstd(?:out|err)\b")
+FLAG = re.compile(r'"[^"]*(?<![\w-])--[a-z]')
+
 # Programs that are one half of a folder's internals.
 FRIENDS = {"tools/shell/import_main.cpp": "assets"}
 
@@ -164,6 +169,21 @@ def check_rooms(root):
                 yield from check_room_include(name, line, match.group(2))
 
 
+def check_terminal(root):
+    """The terminal, its flags and their parser belong to the rooms of the command."""
+    for name in sources(root):
+        folder, room = name.split("/")[0], room_of(name)
+        is_library = folder in FOLDERS[:5]
+        if not is_library and not (folder == "tools" and room in LIBRARY_ROOMS):
+            continue
+        for line, content in enumerate(read(root, name).splitlines(), 1):
+            code = content.split("//")[0]
+            if is_library and FLAG.search(code):
+                yield f"{name}:{line}: a flag; libraries name keys of a scene, in backquotes"
+            if not is_library and (TERMINAL.search(code) or "<CLI/" in code):
+                yield f"{name}:{line}: the terminal is the business of the command's rooms"
+
+
 def check_library_include(root, name, line, included):
     folder = name.split("/")[0]
     if STANDARD_HEADER.match(included) or SYSTEM_HEADER.match(included):
@@ -284,8 +304,8 @@ def check_format(root):
         yield f"{name}: not formatted; run {tool} -i {name}"
 
 
-RULES = {"layout": check_layout, "includes": check_includes, "rooms": check_rooms, "words": check_words,
-         "sizes": check_sizes, "references": check_references, "format": check_format}
+RULES = {"layout": check_layout, "includes": check_includes, "rooms": check_rooms, "terminal": check_terminal,
+         "words": check_words, "sizes": check_sizes, "references": check_references, "format": check_format}
 
 
 def main():

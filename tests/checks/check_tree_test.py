@@ -71,6 +71,13 @@ class CheckTree(unittest.TestCase):
         self.expect("rooms", "fem/attic/old.cpp: lies in none", "fem/linear/factor.cpp:1:", "fem/loose.cpp: lies in none",
                     'fem/time/run.cpp:2: "fem/body/detail/part.h": internals of fem/body')
 
+    def test_flags_and_terminals_in_libraries_are_found(self):
+        self.write("lattice/hint.cpp", 'const char* hint = "try --soft-bones";\n// --soft-bones\nint x = 1; x--;\n')
+        self.write("tools/session/talk.cpp", "#include <CLI/CLI.hpp>\nstd::cerr << 1;\n// on stdout\nprint(stderr, 2);\n")
+        self.write("tools/shell/talk.cpp", 'std::cerr << "--help";\n')
+        self.expect("terminal", "lattice/hint.cpp:1: a flag", "tools/session/talk.cpp:1:", "tools/session/talk.cpp:2:",
+                    "tools/session/talk.cpp:4:")
+
     def test_includes_that_do_not_start_at_the_root_are_found(self):
         self.write("fem/near.cpp", '#include "body.h"\n')
         self.write("fem/gone.cpp", '#include "fem/gone.h"\n')
