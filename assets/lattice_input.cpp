@@ -8,6 +8,11 @@ namespace sinew::assets {
 LatticeInput lattice_input(const Rig& rig) {
   LatticeInput input;
   input.skin = physics_skin(rig);
+  if (rig.parts.empty())
+    throw InputError(
+        rig.file,
+        "mesh: there is none, expected a mesh that is bound to the skeleton; hint: the file holds "
+        "a motion or a skeleton alone; export the character together with it");
   if (input.skin.surface.triangles.rows() == 0) {
     throw InputError(rig.file,
                      "skin: no triangle hangs on a joint, got " + std::to_string(rig.parts.size()) +

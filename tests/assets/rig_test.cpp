@@ -233,6 +233,9 @@ TEST(LatticeInput, NeedsFlesh) {
   } catch (const InputError& e) {
     EXPECT_THAT(e.what(), HasSubstr("small.glb: skin: no triangle hangs on a joint"));
   }
+  rig.parts.clear();
+  EXPECT_THAT([&] { lattice_input(rig); },
+              testing::ThrowsMessage<InputError>(HasSubstr("small.glb: mesh: there is none, expected")));
 }
 
 skeleton::Clip clip(const std::string& name, int num_keys, double end) {

@@ -156,6 +156,30 @@ TEST_F(FleshTrials, NamesARemedyThatHelps) {
   }
 }
 
+// A tail that lags in bumps, guard and all, and a bent sausage whose flesh rests a third of its height from
+// where plain skinning collapses: with what the line names an eye finds nothing more.
+TEST_F(FleshTrials, NamesARemedyThatLeavesNothingToSee) {
+  struct Case {
+    std::string rig, verdict;
+  };
+  for (const Case& one : {Case{"trials/flesh/tail_hop.glb", "rough"},
+                          Case{"nasty/motionbuilder_sausage_rrss_7700_binary.fbx", "torn"}}) {
+    const fs::path rig = fs::path(SINEW_SHARED_DIR) / "data/public" / one.rig;
+    ASSERT_TRUE(fs::exists(rig)) << rig << " is missing";
+    const auto finding_of = [&](const std::string& flags) {
+      fs::remove_all(out("run"));
+      const Outcome outcome =
+          run(command_line("simulate " + quoted(rig) + " --preview off -o " + quoted(out("run")) + flags));
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+      return report("run")["skin"];
+    };
+    const nlohmann::json before = finding_of("");
+    ASSERT_EQ(before["verdict"], one.verdict) << one.rig;
+    const auto line = before["line"].get<std::string>();
+    EXPECT_EQ(finding_of(options_of(line))["verdict"], "fine") << line;
+  }
+}
+
 /// The longest way by which skin was laid back in a frame [m].
 double mended_way(const nlohmann::json& report) {
   double way = 0.0;

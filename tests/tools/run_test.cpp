@@ -84,6 +84,8 @@ TEST(Suggestion, CountsEditsAndSwaps) {
 
 TEST(Suggestion, IsEmptyWhereNothingIsNear) {
   EXPECT_EQ(nearest("--yuong", {"--density", "--young"}), "--young");
+  EXPECT_EQ(nearest("--cel", {"--help", "--cell-size", "--cells"}), "--cells") << "a beginning";
+  EXPECT_EQ(nearest("--models", {"--mode", "--model"}), "--model");
   EXPECT_EQ(nearest("temperature", {"young", "density"}), "");
   EXPECT_EQ(nearest("xyz", {"abc", "de"}), "");
 }

@@ -23,6 +23,15 @@ int edit_distance(std::string_view a, std::string_view b) {
 }
 
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates) {
+  // Who stops typing in the middle of a word means the shortest one that goes on so.
+  constexpr std::size_t kLeastLetters = 2;
+  std::string begun;
+  const bool is_beginning = word.size() - std::min(word.size(), word.find_first_not_of('-')) >= kLeastLetters;
+  for (const std::string& candidate : candidates) {
+    const bool shorter = begun.empty() || candidate.size() < begun.size();
+    if (is_beginning && candidate.starts_with(word) && shorter) begun = candidate;
+  }
+  if (!begun.empty()) return begun;
   int best = std::max(2, static_cast<int>(word.size()) / 3) + 1;
   std::string result;
   for (const std::string& candidate : candidates) {

@@ -10,7 +10,8 @@ namespace sinew::tools {
 /// twice).
 int edit_distance(std::string_view a, std::string_view b);
 
-/// The candidate nearest to `word`, the first of several; empty where none is near (more than a third of the
+/// The shortest candidate that begins with `word`, of two letters at least; else the one nearest to it, the
+/// first of several; empty where none is near (more than a third of the
 /// letters, and more than two, would have to change).
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates);
 
