@@ -54,10 +54,6 @@ struct FaceWeights {
         by_v(-(1 - u), -u, u, 1 - u) {}
 };
 
-}  // namespace
-
-namespace {
-
 using Sides = std::map<std::array<int, 4>, std::vector<Side>>;  ///< by the vertices of the face, ascending.
 
 std::array<int, 4> face_key(const lattice::HexVertices& cell, std::size_t face) {
@@ -108,7 +104,7 @@ class CoarserFaces {
     for (std::size_t c = 0; c < mesh.cells.size(); ++c) first_.push_back(place(mesh.level[c], mesh.hex[c]));
   }
 
-  /// Adds the faces between `side` and coarser cells of `sides_of`. Counts: (int a, int b) -> bool.
+  /// Adds the faces between `side` and coarser cells of `sides_of`. Counts: (Side, Side) -> bool.
   template <class Counts>
   void add(const Side& side, const Sides& sides_of, const Counts& counts,
            std::vector<GhostFace>& faces) const {

@@ -299,7 +299,7 @@ TEST(MixedLevels, DoNotLock) {
     };
     return tests::tip_sag(tests::bar_body(bar));
   };
-  EXPECT_NEAR(sag(0.4999) / sag(0.3), 1.0, 0.1);
+  EXPECT_NEAR(sag(0.4999) / sag(0.3), 1.0, 0.1);  // measured: 0.946
 }
 
 TEST(MixedLevels, PullNothingThatMovesWithItsBone) {
@@ -350,8 +350,9 @@ TEST(MixedLevels, MoveAsUniformOnesDo) {
     const auto rms = [](const Points& d) {
       return std::sqrt(d.squaredNorm() / static_cast<double>(d.rows()));
     };
-    EXPECT_LE(rms(mixed - fine), 1.5 * rms(coarse - fine)) << model;
-    EXPECT_LE(rms(mixed - fine), 0.02) << model;
+    // Measured: 1.02 to 1.17 times as far as level 1 is, 0.1 to 0.7 % of the length.
+    EXPECT_LE(rms(mixed - fine), 1.25 * rms(coarse - fine)) << model;
+    EXPECT_LE(rms(mixed - fine), 0.008) << model;
   }
 }
 
