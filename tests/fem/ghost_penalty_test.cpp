@@ -72,6 +72,23 @@ TEST(GhostPenalty, KinkBetweenLevelsCostsItsClosedForm) {
   }
 }
 
+// x y z is trilinear in boxes of every size and smooth from one to the next: the slopes of both sides agree
+// at every point of a face, if they are taken at one point.
+TEST(GhostPenalty, IsZeroForWhatIsSmoothWhereLevelsMeet) {
+  const lattice::BoxOptions box{{0, 0, 0}, {4, 2, 2}, {2, 1, 1}, lattice::CellType::Hexahedron, {}};
+  const lattice::Hierarchy hierarchy(lattice::box_lattice(box), 2);
+  const LeafMesh mesh = graded_mesh(hierarchy, 2.1);
+  const std::vector<FillFractions> empty(mesh.cells.size(), filled(0.0));
+  const LeafMatrices matrices =
+      assemble(mesh, std::vector<Material>(mesh.cells.size(), Material{2.9e3, 0.45, 1000.0}), empty);
+  Points smooth = Points::Zero(mesh.num_vertices(), 3);
+  smooth.col(1) = mesh.points.rowwise().prod();
+  double largest = 0.0;
+  for (const double s : matrices.ghost) largest = std::max(largest, std::abs(s));
+  // Sums of some ten products each way that cancel.
+  EXPECT_LE(apply_ghost(matrices, smooth).cwiseAbs().maxCoeff(), 1e-12 * largest * smooth.maxCoeff());
+}
+
 TEST(GhostPenalty, IsZeroForAffineMapsWhereLevelsMeet) {
   std::mt19937_64 rng(20021);
   for (const auto& [name, complex] : tests::lattices_of_every_kind(0.1)) {
